@@ -86,3 +86,14 @@ def test_every_stream_is_listed():
 )  # fmt: skip
 def test_units_are_read_from_names(name, unit):
     assert units.unit_of(name) == unit
+
+
+@pytest.mark.parametrize("title", sorted(reference_keys.FILES))
+def test_every_key_of_every_file_has_a_meaning(title, keys):
+    chapter = keys.split(f"\n## {title}\n", 1)[1].split("\n## ", 1)[0]
+    table, silent = "", []
+    for line in chapter.split("\n"):
+        table = line.split("**")[1] if line.startswith("**") else table
+        if line.startswith("| `") and not line.removesuffix("|").rsplit(" | ", 1)[1].strip():
+            silent.append(f"{table}: {line.split('`')[1]}")
+    assert not silent

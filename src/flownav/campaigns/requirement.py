@@ -32,11 +32,11 @@ class RequirementTable(ParameterModel):
     allowed_failures: with how many failures the plan may still pass; more of them need more flights.
     """
 
-    measure: str
-    at_most: Number | None = None
-    at_least: Number | None = None
-    probability: Number = Field(gt=0.0, lt=1.0)
-    confidence: Number = Field(0.90, ge=0.5, lt=1.0)
+    measure: str  # its name, such as touchdown.horizontal_m or crash
+    at_most: Number | None = None  # largest figure that passes; this, or at_least
+    at_least: Number | None = None  # smallest figure that passes; this, or at_most
+    probability: Number = Field(gt=0.0, lt=1.0)  # share of all flights that has to pass
+    confidence: Number = Field(0.90, ge=0.5, lt=1.0)  # with which the flights must show it
     allowed_failures: int = Field(2, ge=0, le=10_000)
 
     @field_validator("measure")
@@ -89,12 +89,12 @@ class Conditions(ParameterModel):
     """
 
     ranges: dict[str, Distribution] = Field(default_factory=dict)
-    height_m: tuple[Number, ...] = Field((), max_length=2)
-    sensor: tuple[str, ...] = ()
-    vehicle: tuple[str, ...] = ()
-    fault: tuple[str, ...] = ()
-    fault_begins_s: Number | None = Field(None, ge=0.0, le=3600.0)
-    fault_lasts_s: Number = Field(20.0, gt=0.0, le=3600.0)
+    height_m: tuple[Number, ...] = Field((), max_length=2)  # the path's greatest; of [low, high] ends and middle
+    sensor: tuple[str, ...] = ()  # flow sensor files; "scenario": its own
+    vehicle: tuple[str, ...] = ()  # shipped names, or files beside this one
+    fault: tuple[str, ...] = ()  # names of `flownav faults`; "none": no fault
+    fault_begins_s: Number | None = Field(None, ge=0.0, le=3600.0)  # none: about when it may land
+    fault_lasts_s: Number = Field(20.0, gt=0.0, le=3600.0)  # of a fault that has no length of its own
 
     @model_validator(mode="before")
     @classmethod
@@ -130,12 +130,12 @@ class Conditions(ParameterModel):
 class Requirement(ParameterModel):
     """A requirement's file. set: entries that stand above the scenario's own."""
 
-    schema_version: Literal[1]
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
-    description: str = ""
-    scenario: str
-    vehicle: str | None = None
-    seed: int = Field(1, ge=0, lt=2**63)
+    schema_version: Literal[1]  # of this kind of file; 1
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")  # of the certificate: letters, digits, . _ and -
+    description: str = ""  # one sentence, shown in the certificate
+    scenario: str  # a shipped scenario's name, or a file beside this one
+    vehicle: str | None = None  # a shipped name, or a file beside this one; none: the scenario's
+    seed: int = Field(1, ge=0, lt=2**63)  # of all random draws; the same seed flies the same flights
     set: dict[str, Any] = Field(default_factory=dict)
     conditions: Conditions = Field(default_factory=Conditions)
     requirement: tuple[RequirementTable, ...] = Field(min_length=1, max_length=20)

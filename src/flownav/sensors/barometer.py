@@ -144,17 +144,17 @@ class BarometerSheet(SensorSheet):
 
     shipped_file: ClassVar[str] = "barometer.toml"
 
-    rate_hz: Number = Field(ge=1.0, le=200.0)
-    sigma_m: Number = Field(ge=0.0, le=10.0)
-    resolution_m: Number = Field(0.0, ge=0.0, le=10.0)
-    lag_s: Number = Field(0.0, ge=0.0, le=10.0)
-    offset_sigma_m: Number = Field(0.0, ge=0.0, le=100.0)
-    drift_sigma_m: Number = Field(ge=0.0, le=100.0)
-    drift_tau_s: Number = Field(ge=0.0, le=1e5)
-    ramp_m_per_h: Number = Field(0.0, ge=0.0, le=1000.0)
-    wash_share: Number = Field(0.0, ge=-2.0, le=2.0)
-    ground_share: Number = Field(0.0, ge=-2.0, le=2.0)
-    wash_spread: Number = Field(0.0, ge=0.0, le=2.0)
+    rate_hz: Number = Field(ge=1.0, le=200.0)  # readings a second
+    sigma_m: Number = Field(ge=0.0, le=10.0)  # noise of a reading, standard deviation
+    resolution_m: Number = Field(0.0, ge=0.0, le=10.0)  # readings come in whole steps of this; 0: no steps
+    lag_s: Number = Field(0.0, ge=0.0, le=10.0)  # time constant of port and sensor, first order; 0: none
+    offset_sigma_m: Number = Field(0.0, ge=0.0, le=100.0)  # constant error of a flight, standard deviation
+    drift_sigma_m: Number = Field(ge=0.0, le=100.0)  # wandering error, standard deviation
+    drift_tau_s: Number = Field(ge=0.0, le=1e5)  # its correlation time; 0: white
+    ramp_m_per_h: Number = Field(0.0, ge=0.0, le=1000.0)  # steady drift of a flight, as in warming, standard deviation
+    wash_share: Number = Field(0.0, ge=-2.0, le=2.0)  # pressure at the port over disk loading; positive: reads low
+    ground_share: Number = Field(0.0, ge=-2.0, le=2.0)  # what rotor height 0 adds to it; fades with height
+    wash_spread: Number = Field(0.0, ge=0.0, le=2.0)  # share by which flights differ in both; 0: alike
 
     def parameters(self, rotor_radius_m: float, air_density_kg_m3: float) -> BarometerParameters:
         """Coefficients of one reading on a vehicle with this rotor (of a multirotor: the disk of all its rotors)."""

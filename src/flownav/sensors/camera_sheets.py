@@ -20,11 +20,11 @@ from flownav.sensors.sheet import Lever, SensorSheet, Spells
 class Gain(ParameterModel):
     """The gain over the sensor file's, at heights from low to high: its spread, and where it is cut off."""
 
-    sigma: Number = Field(ge=0.0, le=1.0)
-    lowest: Number = Field(gt=0.0, le=1.0)
-    highest: Number = Field(ge=1.0, le=10.0)
-    low_height_m: Number = Field(gt=0.0, le=1000.0)
-    high_height_m: Number = Field(gt=0.0, le=1000.0)
+    sigma: Number = Field(ge=0.0, le=1.0)  # standard deviation at every height, over the file's gain
+    lowest: Number = Field(gt=0.0, le=1.0)  # no gain is less
+    highest: Number = Field(ge=1.0, le=10.0)  # no gain is more
+    low_height_m: Number = Field(gt=0.0, le=1000.0)  # below it the gain stays
+    high_height_m: Number = Field(gt=0.0, le=1000.0)  # above it the gain stays
 
     _above = field_validator("high_height_m")(more_than("low_height_m"))
 
@@ -32,35 +32,35 @@ class Gain(ParameterModel):
 class CameraGyro(ParameterModel):
     """The gyro on the camera's board; density one-sided, the others one standard deviation."""
 
-    density_deg_s_rthz: Number = Field(ge=0.0, le=100.0)
-    bias_deg_s: Number = Field(ge=0.0, le=100.0)
-    walk_deg_s_rts: Number = Field(ge=0.0, le=100.0)
-    scale_percent: Number = Field(ge=0.0, le=50.0)
+    density_deg_s_rthz: Number = Field(ge=0.0, le=100.0)  # white noise, one-sided density
+    bias_deg_s: Number = Field(ge=0.0, le=100.0)  # at the start of a flight, standard deviation
+    walk_deg_s_rts: Number = Field(ge=0.0, le=100.0)  # random walk of the bias
+    scale_percent: Number = Field(ge=0.0, le=50.0)  # error of an axis's scale, standard deviation
 
 
 class Texture(ParameterModel):
     """The least texture (0 to 1) that it can follow; spells that leave `remaining` of it and multiply the noise."""
 
-    least: Number = Field(0.05, ge=0.0, le=1.0)
+    least: Number = Field(0.05, ge=0.0, le=1.0)  # below it nothing is seen; 0: none, 1: full
     low: Spells = Spells()
-    remaining: Number = Field(0.3, ge=0.0, le=1.0)
-    noise_factor: Number = Field(3.0, ge=1.0, le=100.0)
+    remaining: Number = Field(0.3, ge=0.0, le=1.0)  # share of the texture that a low spell leaves
+    noise_factor: Number = Field(3.0, ge=1.0, le=100.0)  # times the noise in a low spell
 
 
 class Quality(ParameterModel):
     """best: low, slow, over good texture; shares of it lost at the sensor file's greatest height and fastest flow."""
 
-    best: Number = Field(ge=1.0, le=255.0)
-    lost_at_height: Number = Field(ge=0.0, le=1.0)
-    lost_at_speed: Number = Field(ge=0.0, le=1.0)
-    sigma: Number = Field(ge=0.0, le=255.0)
+    best: Number = Field(ge=1.0, le=255.0)  # when low, slow and over good texture; 255: the most
+    lost_at_height: Number = Field(ge=0.0, le=1.0)  # share lost at the sensor file's greatest height
+    lost_at_speed: Number = Field(ge=0.0, le=1.0)  # share lost at the sensor file's fastest flow
+    sigma: Number = Field(ge=0.0, le=255.0)  # noise of a reading's quality, standard deviation
 
 
 class Outliers(ParameterModel):
     """What share of the readings is off by an error of this standard deviation."""
 
-    share: Number = Field(0.0, ge=0.0, le=1.0)
-    sigma_rad_s: Number = Field(1.0, ge=0.0, le=100.0)
+    share: Number = Field(0.0, ge=0.0, le=1.0)  # of the readings, are outliers; 0: none
+    sigma_rad_s: Number = Field(1.0, ge=0.0, le=100.0)  # error of an outlier, standard deviation
 
 
 class FlowCameraSheet(SensorSheet):
@@ -68,11 +68,11 @@ class FlowCameraSheet(SensorSheet):
 
     shipped_file: ClassVar[str] = "flow_camera.toml"
 
-    rate_hz: Number = Field(ge=1.0, le=500.0)
-    exposure_s: Number = Field(gt=0.0, le=1.0)
-    lost_share: Number = Field(0.0, ge=0.0, le=1.0)
-    misalignment_deg: Number = Field(ge=0.0, le=10.0)
-    noise_spread: Number = Field(0.0, ge=0.0, le=2.0)
+    rate_hz: Number = Field(ge=1.0, le=500.0)  # readings a second
+    exposure_s: Number = Field(gt=0.0, le=1.0)  # over which it sums image and gyro
+    lost_share: Number = Field(0.0, ge=0.0, le=1.0)  # of the readings, never arrive
+    misalignment_deg: Number = Field(ge=0.0, le=10.0)  # of the mounting about each axis, standard deviation
+    noise_spread: Number = Field(0.0, ge=0.0, le=2.0)  # share by which flights (grounds) differ in the noise; 0: alike
     gain: Gain
     gyro: CameraGyro
     texture: Texture = Texture()
@@ -105,10 +105,10 @@ class Missed(ParameterModel):
     A share that is worse than low and slow must not be less than that one's.
     """
 
-    share: Number = Field(ge=1e-6, le=0.99)
-    share_at_max_height: Number = Field(ge=1e-6, le=0.9999)
-    share_at_blur: Number = Field(ge=1e-6, le=0.9999)
-    blur_rad_s: Number = Field(gt=0.0, le=100.0)
+    share: Number = Field(ge=1e-6, le=0.99)  # missed when low and slow
+    share_at_max_height: Number = Field(ge=1e-6, le=0.9999)  # missed at max_height_m, slow
+    share_at_blur: Number = Field(ge=1e-6, le=0.9999)  # missed at the image rate blur_rad_s, low
+    blur_rad_s: Number = Field(gt=0.0, le=100.0)  # image rate of the ground below, for share_at_blur
 
     @field_validator("share_at_max_height", "share_at_blur")
     @classmethod
@@ -121,17 +121,17 @@ class Missed(ParameterModel):
 class AngleNoise(ParameterModel):
     """Standard deviation of each angle: floor, per metre of height, per rad/s of image rate, added in squares."""
 
-    floor_mrad: Number = Field(ge=0.0, le=1000.0)
-    per_m_mrad: Number = Field(0.0, ge=0.0, le=1000.0)
-    per_rad_s_mrad: Number = Field(0.0, ge=0.0, le=1000.0)
+    floor_mrad: Number = Field(ge=0.0, le=1000.0)  # low and slow
+    per_m_mrad: Number = Field(0.0, ge=0.0, le=1000.0)  # more with distance squared over height
+    per_rad_s_mrad: Number = Field(0.0, ge=0.0, le=1000.0)  # more with the image rate of the ground below
 
 
 class DistanceNoise(ParameterModel):
     """Standard deviation of the distance as a part of it, likewise."""
 
-    floor_percent: Number = Field(ge=0.0, le=100.0)
-    per_m_percent: Number = Field(0.0, ge=0.0, le=100.0)
-    per_rad_s_percent: Number = Field(0.0, ge=0.0, le=100.0)
+    floor_percent: Number = Field(ge=0.0, le=100.0)  # low and slow
+    per_m_percent: Number = Field(0.0, ge=0.0, le=100.0)  # more with distance squared over height
+    per_rad_s_percent: Number = Field(0.0, ge=0.0, le=100.0)  # more with the image rate of the ground below
 
 
 class PadCameraSheet(SensorSheet):
@@ -146,22 +146,22 @@ class PadCameraSheet(SensorSheet):
 
     shipped_file: ClassVar[str] = "pad_camera.toml"
 
-    rate_hz: Number = Field(ge=0.5, le=200.0)
+    rate_hz: Number = Field(ge=0.5, le=200.0)  # frames a second
     camera: str = ""
     angle: AngleNoise
     distance: DistanceNoise
-    min_height_m: Number = Field(ge=0.0, le=100.0)
-    max_height_m: Number = Field(gt=0.0, le=100.0)
-    half_view_deg: Number = Field(gt=0.0, lt=80.0)
-    half_view_right_deg: Number | None = Field(None, gt=0.0, lt=80.0)
-    side_m: Number = Field(0.0, ge=0.0, le=20.0)
-    ratio: Number = Field(1.0, ge=1.0, le=20.0)
-    boresight_deg: Number = Field(ge=0.0, le=5.0)
-    scale_percent: Number = Field(0.0, ge=0.0, le=20.0)
+    min_height_m: Number = Field(ge=0.0, le=100.0)  # of the lens over the pad; lower: not seen
+    max_height_m: Number = Field(gt=0.0, le=100.0)  # greatest distance squared over height that finds the mark
+    half_view_deg: Number = Field(gt=0.0, lt=80.0)  # half the view, forward
+    half_view_right_deg: Number | None = Field(None, gt=0.0, lt=80.0)  # half the view, right; none: as forward
+    side_m: Number = Field(0.0, ge=0.0, le=20.0)  # of the mark, which must be whole in view; 0: its centre
+    ratio: Number = Field(1.0, ge=1.0, le=20.0)  # size of a second mark round it over its own; 1: there is none
+    boresight_deg: Number = Field(ge=0.0, le=5.0)  # error of the mounting about each axis, standard deviation
+    scale_percent: Number = Field(0.0, ge=0.0, le=20.0)  # error of the focal length, standard deviation
     hidden_share: Number = Field(0.0, ge=0.0, le=1.0)
     stated_spread: Number = Field(0.0, ge=0.0, le=2.0)
     missed: Missed
-    false_share: Number = Field(0.0, ge=0.0, le=1.0)
+    false_share: Number = Field(0.0, ge=0.0, le=1.0)  # of the frames, take something else for the pad
     lens: Lever = Lever()
 
     _above = field_validator("max_height_m")(more_than("min_height_m"))

@@ -29,9 +29,9 @@ Array = NDArray[np.float64]
 class Dynamics(ParameterModel):
     """G(s) = a/(s^2 + b s + c), velocity to velocity."""
 
-    a_1_s2: Number = Field(gt=0.0, le=1e7)
-    b_1_s: Number = Field(gt=0.0, le=1e4)
-    c_1_s2: Number = Field(gt=0.0, le=1e7)
+    a_1_s2: Number = Field(gt=0.0, le=1e7)  # a/c is the gain: reported over true slow velocity
+    b_1_s: Number = Field(gt=0.0, le=1e4)  # b/c is the delay of slow motion
+    c_1_s2: Number = Field(gt=0.0, le=1e7)  # square of the natural frequency
 
     @property
     def gain(self) -> float:
@@ -57,19 +57,19 @@ class Dynamics(ParameterModel):
 class IdentifiedModel(Dynamics):
     """One row of a table of identified models."""
 
-    height_m: Number = Field(gt=0.0, le=1000.0)
-    model: int = Field(ge=1)
-    fit_percent: Number = Field(le=100.0)
+    height_m: Number = Field(gt=0.0, le=1000.0)  # at which it was identified
+    model: int = Field(ge=1)  # its number at this height
+    fit_percent: Number = Field(le=100.0)  # of the velocity explained; 100: all, 0: no more than its mean
 
 
 class Limits(ParameterModel):
     """Where the sensor measures. `hysteresis` is the fraction inside each limit that it takes to engage."""
 
-    min_height_m: Number = Field(ge=0.0, le=1000.0)
-    max_height_m: Number = Field(gt=0.0, le=1000.0)
-    max_flow_rad_s: Number = Field(gt=0.0, le=100.0)
-    max_tilt_deg: Number = Field(gt=0.0, lt=84.0)
-    hysteresis: Number = Field(0.05, ge=0.0, lt=0.5)
+    min_height_m: Number = Field(ge=0.0, le=1000.0)  # of the lens; lower: it does not measure
+    max_height_m: Number = Field(gt=0.0, le=1000.0)  # of the lens; higher: it does not measure
+    max_flow_rad_s: Number = Field(gt=0.0, le=100.0)  # of either axis, rotation included; faster: it does not follow
+    max_tilt_deg: Number = Field(gt=0.0, lt=84.0)  # of the boresight from straight down
+    hysteresis: Number = Field(0.05, ge=0.0, lt=0.5)  # how far inside each limit, as a part of it, it engages
 
     @field_validator("max_height_m")
     @classmethod
@@ -80,8 +80,8 @@ class Limits(ParameterModel):
 class Optics(ParameterModel):
     """The square image that the pattern must fill."""
 
-    focal_length_px: Number = Field(gt=0.0, le=1e6)
-    image_side_px: Number = Field(gt=0.0, le=1e6)
+    focal_length_px: Number = Field(gt=0.0, le=1e6)  # in pixels of the image that flow is found in
+    image_side_px: Number = Field(gt=0.0, le=1e6)  # side of the square image
 
     @property
     def half_fov_tangent(self) -> float:
@@ -92,8 +92,8 @@ class Optics(ParameterModel):
 class LogSource(ParameterModel):
     """A file that the sensor was identified from."""
 
-    path: str
-    sha256: str
+    path: str  # where it lay
+    sha256: str  # of its content, hexadecimal
 
 
 class IdentifiedResponse(ParameterModel):
@@ -102,89 +102,89 @@ class IdentifiedResponse(ParameterModel):
     validation_percent: fit on runs that the model has not seen, their mean.
     """
 
-    axis: Literal["x", "y"]
-    height_m: Number = Field(gt=0.0, le=1000.0)
-    gain: Number
-    gain_low: Number
-    gain_high: Number
-    latency_s: Number
-    latency_low_s: Number
-    latency_high_s: Number
-    order: str
-    fit_percent: Number = Field(le=100.0)
-    validation_percent: Number | None = Field(None, le=100.0)
-    residual_sigma_m_s: Number = Field(ge=0.0)
-    residuals_white: bool
-    runs: int = Field(ge=1)
-    readings: int = Field(ge=1)
+    axis: Literal["x", "y"]  # of velocity: x forward, y to the right
+    height_m: Number = Field(gt=0.0, le=1000.0)  # at which it was identified
+    gain: Number  # reported over true slow velocity
+    gain_low: Number  # lower end of its 95 % interval
+    gain_high: Number  # upper end of its 95 % interval
+    latency_s: Number  # delay of slow motion
+    latency_low_s: Number  # lower end of its 95 % interval
+    latency_high_s: Number  # upper end of its 95 % interval
+    order: str  # of the model; +delay: and a pure delay; delay: nothing but one
+    fit_percent: Number = Field(le=100.0)  # of the velocity explained; 100: all, 0: no more than its mean
+    validation_percent: Number | None = Field(None, le=100.0)  # mean fit on runs that the model has not seen
+    residual_sigma_m_s: Number = Field(ge=0.0)  # standard deviation of what the model leaves over
+    residuals_white: bool  # whether no dynamics are left over
+    runs: int = Field(ge=1)  # how many
+    readings: int = Field(ge=1)  # how many
 
 
 class NoiseAtHeight(ParameterModel):
     """Standard deviation of the error about one height."""
 
-    height_m: Number = Field(gt=0.0, le=1000.0)
-    sigma_m_s: Number = Field(ge=0.0)
-    readings: int = Field(ge=1)
+    height_m: Number = Field(gt=0.0, le=1000.0)  # about which the readings lie
+    sigma_m_s: Number = Field(ge=0.0)  # standard deviation of the readings' error
+    readings: int = Field(ge=1)  # how many
 
 
 class QualityVariance(ParameterModel):
     """Error variance of readings whose quality lies from quality_low to quality_high."""
 
-    quality_low: int = Field(ge=0, le=255)
-    quality_high: int = Field(ge=0, le=255)
-    variance_m2_s2: Number = Field(ge=0.0)
-    readings: int = Field(ge=1)
+    quality_low: int = Field(ge=0, le=255)  # least quality of these readings, 0 to 255
+    quality_high: int = Field(ge=0, le=255)  # greatest quality of these readings, 0 to 255
+    variance_m2_s2: Number = Field(ge=0.0)  # of the readings' error
+    readings: int = Field(ge=1)  # how many
 
 
 class DynamicsInterval(ParameterModel):
     """95 % intervals of the dynamics. `validity`: "identified", or "assumed" where only gain and latency are."""
 
-    validity: Literal["identified", "assumed"]
-    note: str
-    a_low_1_s2: Number | None = None
-    a_high_1_s2: Number | None = None
-    b_low_1_s: Number | None = None
-    b_high_1_s: Number | None = None
-    c_low_1_s2: Number | None = None
-    c_high_1_s2: Number | None = None
+    validity: Literal["identified", "assumed"]  # assumed: only gain and latency are identified
+    note: str  # what holds, in words
+    a_low_1_s2: Number | None = None  # lower end of the 95 % interval of dynamics.a_1_s2
+    a_high_1_s2: Number | None = None  # upper end of the 95 % interval of dynamics.a_1_s2
+    b_low_1_s: Number | None = None  # lower end of the 95 % interval of dynamics.b_1_s
+    b_high_1_s: Number | None = None  # upper end of the 95 % interval of dynamics.b_1_s
+    c_low_1_s2: Number | None = None  # lower end of the 95 % interval of dynamics.c_1_s2
+    c_high_1_s2: Number | None = None  # upper end of the 95 % interval of dynamics.c_1_s2
 
 
 class Identification(ParameterModel):
     """Where an identified sensor's figures come from; nothing that simulation needs, everything that judges it."""
 
-    kind: Literal["rig", "flight"]
-    reference: str
-    axes: str
-    verdict: str
-    parameters: int = Field(ge=1)
-    identifiable: int = Field(ge=0)
-    gain: Number
-    gain_low: Number
-    gain_high: Number
-    latency_s: Number
-    latency_low_s: Number
-    latency_high_s: Number
-    lowest_height_m: Number = Field(ge=0.0)
-    highest_height_m: Number = Field(gt=0.0)
-    fastest_flow_rad_s: Number = Field(ge=0.0)
-    least_quality: int = Field(ge=0, le=255)
-    noise_exponent_low: Number
-    noise_exponent_high: Number
+    kind: Literal["rig", "flight"]  # whether a rig or a flight was logged
+    reference: str  # what the sensor was compared with
+    axes: str  # whether axes are swapped or inverted, in words
+    verdict: str  # which parameters the log shows, in words
+    parameters: int = Field(ge=1)  # how many the model has
+    identifiable: int = Field(ge=0)  # how many of them the log shows
+    gain: Number  # reported over true velocity, over all axes and heights
+    gain_low: Number  # lower end of its 95 % interval
+    gain_high: Number  # upper end of its 95 % interval
+    latency_s: Number  # delay of slow motion, over all axes and heights
+    latency_low_s: Number  # lower end of its 95 % interval
+    latency_high_s: Number  # upper end of its 95 % interval
+    lowest_height_m: Number = Field(ge=0.0)  # of the readings used
+    highest_height_m: Number = Field(gt=0.0)  # of the readings used
+    fastest_flow_rad_s: Number = Field(ge=0.0)  # of the usable readings (99.9 %)
+    least_quality: int = Field(ge=0, le=255)  # of the readings used, 0 to 255
+    noise_exponent_low: Number  # lower end of the 95 % interval of noise.exponent
+    noise_exponent_high: Number  # upper end of the 95 % interval of noise.exponent
     dynamics: DynamicsInterval
     responses: tuple[IdentifiedResponse, ...]
     noise: tuple[NoiseAtHeight, ...]
     quality: tuple[QualityVariance, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what else was found, a line each
     sources: tuple[LogSource, ...] = ()
 
 
 class FlowSensor(ParameterModel):
     """A flow sensor's file. `identification` stands in those that `flownav identify` wrote."""
 
-    schema_version: Literal[1]
-    name: str
-    provenance: str
-    sonar_floor_m: Number = Field(0.0, ge=0.0, le=10.0)
+    schema_version: Literal[1]  # of this kind of file; 1
+    name: str  # of the sensor
+    provenance: str  # where the figures come from
+    sonar_floor_m: Number = Field(0.0, ge=0.0, le=10.0)  # nearer it reads this, and velocities too fast; 0: never
     dynamics: Dynamics
     noise: Noise
     limits: Limits

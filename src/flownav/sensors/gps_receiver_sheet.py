@@ -16,28 +16,28 @@ from flownav.sensors.sheet import Lever, SensorSheet, Spells
 class PositionErrors(ParameterModel):
     """Slow, fast and white error of an axis; `spread`: the share by which flights differ in all of them."""
 
-    slow_sigma_m: Number = Field(ge=0.0, le=100.0)
-    slow_sigma_down_m: Number = Field(ge=0.0, le=100.0)
-    slow_tau_s: Number = Field(ge=0.0, le=1e5)
-    fast_sigma_m: Number = Field(ge=0.0, le=100.0)
-    fast_sigma_down_m: Number = Field(ge=0.0, le=100.0)
-    fast_tau_s: Number = Field(ge=0.0, le=1e5)
-    white_sigma_m: Number = Field(ge=0.0, le=100.0)
-    white_sigma_down_m: Number = Field(ge=0.0, le=100.0)
-    quantum_m: Number = Field(0.0, ge=0.0, le=1.0)
-    spread: Number = Field(0.0, ge=0.0, le=2.0)
+    slow_sigma_m: Number = Field(ge=0.0, le=100.0)  # ionosphere and orbits: standard deviation, north and east
+    slow_sigma_down_m: Number = Field(ge=0.0, le=100.0)  # the same, down
+    slow_tau_s: Number = Field(ge=0.0, le=1e5)  # its correlation time; 0: white
+    fast_sigma_m: Number = Field(ge=0.0, le=100.0)  # multipath: standard deviation, north and east
+    fast_sigma_down_m: Number = Field(ge=0.0, le=100.0)  # the same, down
+    fast_tau_s: Number = Field(ge=0.0, le=1e5)  # its correlation time; 0: white
+    white_sigma_m: Number = Field(ge=0.0, le=100.0)  # noise of a fix: standard deviation, north and east
+    white_sigma_down_m: Number = Field(ge=0.0, le=100.0)  # the same, down
+    quantum_m: Number = Field(0.0, ge=0.0, le=1.0)  # positions come in whole steps of this; 0: no steps
+    spread: Number = Field(0.0, ge=0.0, le=2.0)  # share by which flights differ in all of them; 0: alike
 
 
 class VelocityErrors(ParameterModel):
     """Correlated and white error of an axis, and the time constant of the receiver's own smoothing."""
 
-    sigma_m_s: Number = Field(ge=0.0, le=10.0)
-    sigma_down_m_s: Number = Field(ge=0.0, le=10.0)
-    tau_s: Number = Field(ge=0.0, le=1e5)
-    white_m_s: Number = Field(ge=0.0, le=10.0)
-    white_down_m_s: Number = Field(ge=0.0, le=10.0)
-    smoothing_tau_s: Number = Field(0.0, ge=0.0, le=2.0)
-    quantum_m_s: Number = Field(0.0, ge=0.0, le=1.0)
+    sigma_m_s: Number = Field(ge=0.0, le=10.0)  # lasting error: standard deviation, north and east
+    sigma_down_m_s: Number = Field(ge=0.0, le=10.0)  # the same, down
+    tau_s: Number = Field(ge=0.0, le=1e5)  # its correlation time; 0: white
+    white_m_s: Number = Field(ge=0.0, le=10.0)  # noise of a fix: standard deviation, north and east
+    white_down_m_s: Number = Field(ge=0.0, le=10.0)  # the same, down
+    smoothing_tau_s: Number = Field(0.0, ge=0.0, le=2.0)  # lag of the receiver's own smoothing; 0: none
+    quantum_m_s: Number = Field(0.0, ge=0.0, le=1.0)  # velocities come in whole steps of this; 0: no steps
 
 
 class GpsReceiverSheet(SensorSheet):
@@ -45,10 +45,10 @@ class GpsReceiverSheet(SensorSheet):
 
     shipped_file: ClassVar[str] = "gps_receiver.toml"
 
-    rate_hz: Number = Field(ge=0.2, le=50.0)
+    rate_hz: Number = Field(ge=0.2, le=50.0)  # fixes a second
     position: PositionErrors
     velocity: VelocityErrors
-    stated_spread: Number = Field(0.0, ge=0.0, le=2.0)
+    stated_spread: Number = Field(0.0, ge=0.0, le=2.0)  # share by which the accuracies that it states are wrong
     outage: Spells = Spells()
     antenna: Lever = Lever()
 

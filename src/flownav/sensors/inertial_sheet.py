@@ -16,39 +16,39 @@ from flownav.sensors.sheet import SensorSheet
 class GyroSheet(ParameterModel):
     """density: one-sided; bias: at the start, one standard deviation; scale, misalignment, g-sensitivity: the same."""
 
-    density_deg_s_rthz: Number = Field(ge=0.0, le=100.0)
-    bias_deg_s: Number = Field(ge=0.0, le=100.0)
-    walk_deg_s_rts: Number = Field(ge=0.0, le=100.0)
-    scale_percent: Number = Field(ge=0.0, le=20.0)
-    misalignment_deg: Number = Field(ge=0.0, le=5.0)
-    g_sensitivity_deg_s_g: Number = Field(ge=0.0, le=10.0)
-    range_deg_s: Number = Field(gt=0.0, le=1e4)
+    density_deg_s_rthz: Number = Field(ge=0.0, le=100.0)  # white noise, one-sided density
+    bias_deg_s: Number = Field(ge=0.0, le=100.0)  # at the start of a flight, standard deviation
+    walk_deg_s_rts: Number = Field(ge=0.0, le=100.0)  # random walk of the bias
+    scale_percent: Number = Field(ge=0.0, le=20.0)  # error of an axis's scale, standard deviation
+    misalignment_deg: Number = Field(ge=0.0, le=5.0)  # of each axis towards each other one, standard deviation
+    g_sensitivity_deg_s_g: Number = Field(ge=0.0, le=10.0)  # rate read per acceleration, standard deviation
+    range_deg_s: Number = Field(gt=0.0, le=1e4)  # readings stop at this, either way
 
 
 class AccelerometerSheet(ParameterModel):
     """As the gyro's; densities and biases in parts of standard gravity."""
 
-    density_ug_rthz: Number = Field(ge=0.0, le=1e5)
-    bias_mg: Number = Field(ge=0.0, le=1000.0)
-    walk_mg_rts: Number = Field(ge=0.0, le=1000.0)
-    scale_percent: Number = Field(ge=0.0, le=20.0)
-    misalignment_deg: Number = Field(ge=0.0, le=5.0)
-    range_g: Number = Field(gt=0.0, le=1000.0)
+    density_ug_rthz: Number = Field(ge=0.0, le=1e5)  # white noise, one-sided density
+    bias_mg: Number = Field(ge=0.0, le=1000.0)  # at the start of a flight, standard deviation
+    walk_mg_rts: Number = Field(ge=0.0, le=1000.0)  # random walk of the bias
+    scale_percent: Number = Field(ge=0.0, le=20.0)  # error of an axis's scale, standard deviation
+    misalignment_deg: Number = Field(ge=0.0, le=5.0)  # of each axis towards each other one, standard deviation
+    range_g: Number = Field(gt=0.0, le=1000.0)  # readings stop at this, either way
 
 
 class Tone(ParameterModel):
     """Amplitudes at one frequency, where the unit is fixed: along body x and y, along z, about x and y, about z."""
 
-    level_m_s2: Number = Field(0.0, ge=0.0, le=200.0)
-    vertical_m_s2: Number = Field(0.0, ge=0.0, le=200.0)
-    tilt_deg_s: Number = Field(0.0, ge=0.0, le=500.0)
-    yaw_deg_s: Number = Field(0.0, ge=0.0, le=500.0)
+    level_m_s2: Number = Field(0.0, ge=0.0, le=200.0)  # amplitude along body x and y, a quarter turn apart
+    vertical_m_s2: Number = Field(0.0, ge=0.0, le=200.0)  # amplitude along body z
+    tilt_deg_s: Number = Field(0.0, ge=0.0, le=500.0)  # amplitude of roll and pitch rate, a quarter turn apart
+    yaw_deg_s: Number = Field(0.0, ge=0.0, le=500.0)  # amplitude of the yaw rate
 
 
 class Vibration(ParameterModel):
     """Tones at the rotor's and at the blades' frequency; `spread` is the share by which flights differ."""
 
-    spread: Number = Field(0.0, ge=0.0, le=2.0)
+    spread: Number = Field(0.0, ge=0.0, le=2.0)  # share by which flights differ in all amplitudes; 0: alike
     rotor: Tone = Tone()
     blades: Tone = Tone()
 
@@ -58,8 +58,8 @@ class InertialSheet(SensorSheet):
 
     shipped_file: ClassVar[str] = "inertial.toml"
 
-    rate_hz: Number = Field(ge=100.0, le=1000.0)
-    bandwidth_hz: Number = Field(gt=0.0, le=1e5)
+    rate_hz: Number = Field(ge=100.0, le=1000.0)  # readings a second, each the mean since the last
+    bandwidth_hz: Number = Field(gt=0.0, le=1e5)  # of the low-pass ahead of that mean: first order, -3 dB
     gyro: GyroSheet
     accelerometer: AccelerometerSheet
     vibration: Vibration = Vibration()

@@ -113,9 +113,9 @@ SHARJAH_INCLINATION_DEG = 40.0
 class MagneticField(ParameterModel):
     """The earth's field at a place; inclination downwards. The default is Sharjah's, the paper's place."""
 
-    strength_gauss: Number = Field(SHARJAH_GAUSS, gt=0.0, le=1.0)
-    declination_deg: Number = Field(SHARJAH_DECLINATION_DEG, ge=-180.0, le=180.0)
-    inclination_deg: Number = Field(SHARJAH_INCLINATION_DEG, ge=-90.0, le=90.0)
+    strength_gauss: Number = Field(SHARJAH_GAUSS, gt=0.0, le=1.0)  # of the whole field
+    declination_deg: Number = Field(SHARJAH_DECLINATION_DEG, ge=-180.0, le=180.0)  # of magnetic north; positive: east
+    inclination_deg: Number = Field(SHARJAH_INCLINATION_DEG, ge=-90.0, le=90.0)  # positive: it points into the ground
 
     @property
     def ned_gauss(self) -> tuple[float, float, float]:
@@ -130,12 +130,12 @@ class MagnetometerSheet(SensorSheet):
 
     shipped_file: ClassVar[str] = "magnetometer.toml"
 
-    rate_hz: Number = Field(ge=1.0, le=1000.0)
-    sigma_mgauss: Number = Field(ge=0.0, le=100.0)
-    hard_iron_mgauss: Number = Field(ge=0.0, le=1000.0)
-    scale_percent: Number = Field(ge=0.0, le=50.0)
-    soft_iron_percent: Number = Field(ge=0.0, le=50.0)
-    current_mgauss_per_kw: Number = Field(0.0, ge=0.0, le=1000.0)
+    rate_hz: Number = Field(ge=1.0, le=1000.0)  # readings a second
+    sigma_mgauss: Number = Field(ge=0.0, le=100.0)  # noise of a reading, each axis
+    hard_iron_mgauss: Number = Field(ge=0.0, le=1000.0)  # constant field of the vehicle itself, each axis
+    scale_percent: Number = Field(ge=0.0, le=50.0)  # error of an axis's scale
+    soft_iron_percent: Number = Field(ge=0.0, le=50.0)  # what an axis reads of each other one's field
+    current_mgauss_per_kw: Number = Field(0.0, ge=0.0, le=1000.0)  # field of the motor's current, each axis
 
     def parameters(self, field: MagneticField) -> MagnetometerParameters:
         """Coefficients of one reading at a place."""

@@ -80,15 +80,15 @@ def fit_noise_law(law: Law, low_m: float, high_m: float) -> NoiseFit:
 class Noise(ParameterModel):
     """Standard deviation of a published velocity against height (`noise_law.py`); the law picks its keys."""
 
-    law: Literal["constant", "power", "accuracy"]
-    sigma_m_s: Number | None = Field(None, ge=0.0, le=100.0, validate_default=True)
-    reference_height_m: Number = Field(0.6, gt=0.0, le=1000.0)
-    exponent: Number = Field(1.0, ge=-4.0, le=4.0)
-    accuracy: Number = Field(0.9, gt=0.0, lt=1.0)
-    signal_sigma_m_s: Number | None = Field(None, gt=0.0, le=100.0, validate_default=True)
-    floor_m_s: Number = Field(0.0, ge=0.0, le=100.0)
-    min_height_m: Number = Field(gt=0.0, le=1000.0)
-    max_height_m: Number = Field(gt=0.0, le=1000.0)
+    law: Literal["constant", "power", "accuracy"]  # one figure, a power of the height, or the paper's accuracy rule
+    sigma_m_s: Number | None = Field(None, ge=0.0, le=100.0, validate_default=True)  # at reference_height_m, or always
+    reference_height_m: Number = Field(0.6, gt=0.0, le=1000.0)  # of the laws power and accuracy
+    exponent: Number = Field(1.0, ge=-4.0, le=4.0)  # of the height, in the law power; 0: the same at all heights
+    accuracy: Number = Field(0.9, gt=0.0, lt=1.0)  # of the law accuracy: 1 - sigma/signal_sigma at the reference
+    signal_sigma_m_s: Number | None = Field(None, gt=0.0, le=100.0, validate_default=True)  # of the law accuracy
+    floor_m_s: Number = Field(0.0, ge=0.0, le=100.0)  # least standard deviation, whatever the law says
+    min_height_m: Number = Field(gt=0.0, le=1000.0)  # below it the standard deviation stays
+    max_height_m: Number = Field(gt=0.0, le=1000.0)  # above it the standard deviation stays
 
     @field_validator("sigma_m_s", "signal_sigma_m_s")
     @classmethod

@@ -145,21 +145,21 @@ class RangeSensorSheet(SensorSheet):
 
     shipped_file: ClassVar[str] = "range_sensor.toml"
 
-    rate_hz: Number = Field(ge=1.0, le=1000.0)
-    floor_m: Number = Field(ge=0.0, le=10.0)
-    ceiling_m: Number = Field(gt=0.0, le=1000.0)
-    half_beam_deg: Number = Field(0.0, ge=0.0, le=45.0)
-    max_incidence_deg: Number = Field(60.0, gt=0.0, le=80.0)
-    resolution_m: Number = Field(0.0, ge=0.0, le=1.0)
-    sigma_m: Number = Field(ge=0.0, le=10.0)
-    sigma_percent: Number = Field(0.0, ge=0.0, le=50.0)
-    scale_percent: Number = Field(0.0, ge=0.0, le=20.0)
-    offset_sigma_m: Number = Field(0.0, ge=0.0, le=1.0)
-    echo_share: Number = Field(0.0, ge=0.0, le=1.0)
-    near_echo_m: Number = Field(0.3, ge=0.0, le=10.0)
+    rate_hz: Number = Field(ge=1.0, le=1000.0)  # readings a second
+    floor_m: Number = Field(ge=0.0, le=10.0)  # what it reads of anything nearer
+    ceiling_m: Number = Field(gt=0.0, le=1000.0)  # beyond it no echo: it reads this, with quality 0
+    half_beam_deg: Number = Field(0.0, ge=0.0, le=45.0)  # of the cone, in which it reads the nearest ground; 0: a ray
+    max_incidence_deg: Number = Field(60.0, gt=0.0, le=80.0)  # between beam and the ground's normal; beyond it no echo
+    resolution_m: Number = Field(0.0, ge=0.0, le=1.0)  # readings come in whole steps of this; 0: no steps
+    sigma_m: Number = Field(ge=0.0, le=10.0)  # noise of a reading, standard deviation
+    sigma_percent: Number = Field(0.0, ge=0.0, le=50.0)  # noise that grows with the distance, standard deviation
+    scale_percent: Number = Field(0.0, ge=0.0, le=20.0)  # error of this unit's scale, standard deviation
+    offset_sigma_m: Number = Field(0.0, ge=0.0, le=1.0)  # constant error of this unit, standard deviation
+    echo_share: Number = Field(0.0, ge=0.0, le=1.0)  # of the readings, are false: half twice as far, half near
+    near_echo_m: Number = Field(0.3, ge=0.0, le=10.0)  # what the near false ones read
     lost: Spells = Spells()
     held: Spells = Spells()
-    stuck_at_m: Number | None = Field(None, ge=0.0, le=1000.0)
+    stuck_at_m: Number | None = Field(None, ge=0.0, le=1000.0)  # every reading is this; none: it works
     lens: Lever = Lever()
 
     _above_the_floor = field_validator("ceiling_m")(more_than("floor_m"))

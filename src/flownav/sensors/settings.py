@@ -24,26 +24,26 @@ from flownav.sensors.rangefinder import RangefinderParameters
 class GpsInsSettings(ParameterModel):
     """The MIDG. `white`: independent position noise alone. `midg`: the errors that 2 m CEP stands for."""
 
-    model: Literal["white", "midg"] = "midg"
-    white_sigma_m: Number = Field(0.3, ge=0.0, le=100.0)
-    slow_sigma_m: Number = Field(1.5, ge=0.0, le=100.0)
-    slow_sigma_down_m: Number = Field(2.2, ge=0.0, le=100.0)
-    slow_tau_s: Number = Field(300.0, ge=0.0, le=1e5)
-    fast_sigma_m: Number = Field(0.75, ge=0.0, le=100.0)
-    fast_sigma_down_m: Number = Field(1.2, ge=0.0, le=100.0)
-    fast_tau_s: Number = Field(30.0, ge=0.0, le=1e5)
-    jitter_sigma_m: Number = Field(0.05, ge=0.0, le=100.0)
-    jitter_tau_s: Number = Field(0.3, ge=0.0, le=1e5)
-    position_quantum_m: Number = Field(0.01, ge=0.0, le=1.0)
-    velocity_sigma_m_s: Number = Field(0.12, ge=0.0, le=10.0)
-    velocity_tau_s: Number = Field(10.0, ge=0.0, le=1e5)
-    velocity_white_m_s: Number = Field(0.02, ge=0.0, le=10.0)
-    velocity_quantum_m_s: Number = Field(0.01, ge=0.0, le=1.0)
-    tilt_sigma_deg: Number = Field(0.4, ge=0.0, le=10.0)
-    tilt_tau_s: Number = Field(60.0, ge=0.0, le=1e5)
-    heading_sigma_deg: Number = Field(1.5, ge=0.0, le=30.0)
-    heading_tau_s: Number = Field(100.0, ge=0.0, le=1e5)
-    latency_s: Number = Field(gps_ins.PERIOD_S, ge=0.0, le=gps_ins.PERIOD_S)
+    model: Literal["white", "midg"] = "midg"  # white: independent noise; midg: errors that last, as 2 m CEP
+    white_sigma_m: Number = Field(0.3, ge=0.0, le=100.0)  # white: standard deviation, each axis
+    slow_sigma_m: Number = Field(1.5, ge=0.0, le=100.0)  # midg, slow error: standard deviation, north and east
+    slow_sigma_down_m: Number = Field(2.2, ge=0.0, le=100.0)  # midg, slow error: standard deviation, down
+    slow_tau_s: Number = Field(300.0, ge=0.0, le=1e5)  # midg, slow error: correlation time; 0: white
+    fast_sigma_m: Number = Field(0.75, ge=0.0, le=100.0)  # midg, fast error: standard deviation, north and east
+    fast_sigma_down_m: Number = Field(1.2, ge=0.0, le=100.0)  # midg, fast error: standard deviation, down
+    fast_tau_s: Number = Field(30.0, ge=0.0, le=1e5)  # midg, fast error: correlation time; 0: white
+    jitter_sigma_m: Number = Field(0.05, ge=0.0, le=100.0)  # midg, jitter: standard deviation, each axis
+    jitter_tau_s: Number = Field(0.3, ge=0.0, le=1e5)  # midg, jitter: correlation time; 0: white
+    position_quantum_m: Number = Field(0.01, ge=0.0, le=1.0)  # midg: positions in whole steps of this; 0: none
+    velocity_sigma_m_s: Number = Field(0.12, ge=0.0, le=10.0)  # midg, lasting error: standard deviation, each axis
+    velocity_tau_s: Number = Field(10.0, ge=0.0, le=1e5)  # midg, lasting error of velocity: correlation time
+    velocity_white_m_s: Number = Field(0.02, ge=0.0, le=10.0)  # midg: white noise of velocity, each axis
+    velocity_quantum_m_s: Number = Field(0.01, ge=0.0, le=1.0)  # midg: velocities in whole steps of this; 0: none
+    tilt_sigma_deg: Number = Field(0.4, ge=0.0, le=10.0)  # midg: error of roll and of pitch, standard deviation
+    tilt_tau_s: Number = Field(60.0, ge=0.0, le=1e5)  # midg: its correlation time
+    heading_sigma_deg: Number = Field(1.5, ge=0.0, le=30.0)  # midg: error of heading, standard deviation
+    heading_tau_s: Number = Field(100.0, ge=0.0, le=1e5)  # midg: its correlation time
+    latency_s: Number = Field(gps_ins.PERIOD_S, ge=0.0, le=gps_ins.PERIOD_S)  # midg: age of a reading, 0 or 0.02
 
     @field_validator("*")
     @classmethod
@@ -119,18 +119,18 @@ class FlowSettings(ParameterModel):
     dynamics; constant_noise_m_s replaces its noise law.
     """
 
-    vertical: Literal["synthetic", "sonar"] = "synthetic"
-    sonar_overscale: bool = True
-    sonar_lag_s: Number = Field(0.0, ge=0.0, le=1.0)
-    rotation_leak: Number = Field(0.0, ge=-1.0, le=1.0)
-    shake: bool = True
-    shake_frequency_hz: Number = Field(4.0, gt=0.0, le=100.0)
-    shake_damping_ratio: Number = Field(0.1, gt=0.0, le=2.0)
-    shake_horizontal_fraction: Number = Field(0.2, ge=-1.0, le=1.0)
-    gain_sigma: Number = Field(0.0, ge=0.0, le=0.5)
-    constant_noise_m_s: Number | None = Field(None, ge=0.0, le=100.0)
-    identified_height_m: Number | None = Field(None, gt=0.0, le=1000.0)
-    identified_model: int | None = Field(None, ge=1, validate_default=True)
+    vertical: Literal["synthetic", "sonar"] = "synthetic"  # paper's filter: from the true speed, or the sonar's rate
+    sonar_overscale: bool = True  # paper's filter: reads too fast below the sonar's floor
+    sonar_lag_s: Number = Field(0.0, ge=0.0, le=1.0)  # paper's filter: age of the range that scales the flow; 0: none
+    rotation_leak: Number = Field(0.0, ge=-1.0, le=1.0)  # paper's filter: share of rotation its gyro leaves in; 0: none
+    shake: bool = True  # whether the mount shakes when the thrust changes
+    shake_frequency_hz: Number = Field(4.0, gt=0.0, le=100.0)  # natural frequency of the mount
+    shake_damping_ratio: Number = Field(0.1, gt=0.0, le=2.0)  # of the mount; 1: critical
+    shake_horizontal_fraction: Number = Field(0.2, ge=-1.0, le=1.0)  # of the shake, seen as velocity forward and right
+    gain_sigma: Number = Field(0.0, ge=0.0, le=0.5)  # without effect; the flow camera's datasheet has [gain] sigma
+    constant_noise_m_s: Number | None = Field(None, ge=0.0, le=100.0)  # at every height; none: the file's [noise]
+    identified_height_m: Number | None = Field(None, gt=0.0, le=1000.0)  # row of the file's models; none: [dynamics]
+    identified_model: int | None = Field(None, ge=1, validate_default=True)  # that row's number at this height
 
     @field_validator("identified_model")
     @classmethod
@@ -176,11 +176,11 @@ class FlowSettings(ParameterModel):
 class RangefinderSettings(ParameterModel):
     """The HRLV sonar of the PX4FLOW."""
 
-    floor_m: Number = Field(0.3, ge=0.0, le=10.0)
-    ceiling_m: Number = Field(5.0, gt=0.0, le=1000.0, validate_default=True)
-    resolution_m: Number = Field(0.001, ge=0.0, le=1.0)
-    sigma_m: Number = Field(0.005, ge=0.0, le=10.0)
-    stuck_at_m: Number | None = Field(None, ge=0.0, le=1000.0)
+    floor_m: Number = Field(0.3, ge=0.0, le=10.0)  # what it reads of anything nearer
+    ceiling_m: Number = Field(5.0, gt=0.0, le=1000.0, validate_default=True)  # beyond: no echo, and it reads this
+    resolution_m: Number = Field(0.001, ge=0.0, le=1.0)  # readings come in whole steps of this; 0: no steps
+    sigma_m: Number = Field(0.005, ge=0.0, le=10.0)  # noise of a reading, standard deviation
+    stuck_at_m: Number | None = Field(None, ge=0.0, le=1000.0)  # every reading is this; none: it works
 
     @field_validator("ceiling_m")
     @classmethod
@@ -201,8 +201,8 @@ class RangefinderSettings(ParameterModel):
 class PadFixSettings(ParameterModel):
     """A camera that finds the pad: noise of its angles and distance, and where it works."""
 
-    angle_sigma_rad: Number = Field(0.005, gt=0.0, le=1.0)
-    distance_sigma: Number = Field(0.02, gt=0.0, le=1.0)
-    min_height_m: Number = Field(0.3, ge=0.0, le=100.0)
-    max_height_m: Number = Field(3.0, gt=0.0, le=100.0)
-    half_view_deg: Number = Field(30.0, gt=0.0, lt=80.0)
+    angle_sigma_rad: Number = Field(0.005, gt=0.0, le=1.0)  # noise across the line of sight, standard deviation
+    distance_sigma: Number = Field(0.02, gt=0.0, le=1.0)  # noise of the distance as a part of it, standard deviation
+    min_height_m: Number = Field(0.3, ge=0.0, le=100.0)  # of the lens over the pad; lower: not seen
+    max_height_m: Number = Field(3.0, gt=0.0, le=100.0)  # of the lens over the pad; higher: not seen
+    half_view_deg: Number = Field(30.0, gt=0.0, lt=80.0)  # half the angle of view, forward and to the right

@@ -20,12 +20,12 @@ class SensorSheet(ParameterModel):
 
     shipped_file: ClassVar[str] = ""
 
-    schema_version: Literal[1]
-    name: str
-    provenance: str
-    rate_hz: Number = Field(gt=0.0, le=1000.0)
-    latency_s: Number = Field(ge=0.0, le=2.0)
-    jitter_s: Number = Field(0.0, ge=0.0, le=1.0, validate_default=True)
+    schema_version: Literal[1]  # of this kind of file; 1
+    name: str  # of the sensor
+    provenance: str  # where the figures come from
+    rate_hz: Number = Field(gt=0.0, le=1000.0)  # readings a second
+    latency_s: Number = Field(ge=0.0, le=2.0)  # age of a reading when it arrives, on average
+    jitter_s: Number = Field(0.0, ge=0.0, le=1.0, validate_default=True)  # ages lie evenly within latency_s +- this
 
     @field_validator("jitter_s")
     @classmethod
@@ -48,8 +48,8 @@ class SensorSheet(ParameterModel):
 class Spells(ParameterModel):
     """Spells that come by chance: what share of the time they fill, and how long one lasts on average."""
 
-    share: Number = Field(0.0, ge=0.0, le=0.5)
-    mean_s: Number = Field(1.0, gt=0.0, le=1e4)
+    share: Number = Field(0.0, ge=0.0, le=0.5)  # of the time that they fill; 0: they never come
+    mean_s: Number = Field(1.0, gt=0.0, le=1e4)  # how long one lasts on average
 
     def levels(self, period_s: float) -> tuple[float, float]:
         """`(begins_above, ends_above)` for a standard normal drawn once a period."""
@@ -59,6 +59,6 @@ class Spells(ParameterModel):
 class Lever(ParameterModel):
     """Where the sensor sits, from the centre of gravity, body FRD."""
 
-    forward_m: Number = Field(0.0, ge=-10.0, le=10.0)
-    right_m: Number = Field(0.0, ge=-10.0, le=10.0)
-    down_m: Number = Field(0.0, ge=-10.0, le=10.0)
+    forward_m: Number = Field(0.0, ge=-10.0, le=10.0)  # of the centre of gravity; negative: behind it
+    right_m: Number = Field(0.0, ge=-10.0, le=10.0)  # of the centre of gravity; negative: to its left
+    down_m: Number = Field(0.0, ge=-10.0, le=10.0)  # below the centre of gravity; negative: above it

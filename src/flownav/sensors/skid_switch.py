@@ -97,13 +97,13 @@ class SkidSwitchSheet(SensorSheet):
 
     shipped_file: ClassVar[str] = "skid_switch.toml"
 
-    rate_hz: Number = Field(ge=1.0, le=1000.0)
-    closing_share: Number = Field(gt=0.0, le=1.0)
-    opening_share: Number = Field(gt=0.0, le=1.0)
-    sigma_share: Number = Field(0.0, ge=0.0, le=1.0)
-    debounce_s: Number = Field(ge=0.0, le=5.0)
-    stuck_open_share: Number = Field(0.0, ge=0.0, le=0.5)
-    stuck_closed_share: Number = Field(0.0, ge=0.0, le=0.5)
+    rate_hz: Number = Field(ge=1.0, le=1000.0)  # readings a second
+    closing_share: Number = Field(gt=0.0, le=1.0)  # load over weight at which it closes: on the ground
+    opening_share: Number = Field(gt=0.0, le=1.0)  # load over weight at which it opens: in flight
+    sigma_share: Number = Field(0.0, ge=0.0, le=1.0)  # noise of the load over weight, standard deviation
+    debounce_s: Number = Field(ge=0.0, le=5.0)  # so long the contact must stay before it is believed
+    stuck_open_share: Number = Field(0.0, ge=0.0, le=0.5)  # of flights, on which it never closes
+    stuck_closed_share: Number = Field(0.0, ge=0.0, le=0.5)  # of flights, on which it never opens
 
     @field_validator("opening_share")
     @classmethod

@@ -45,12 +45,12 @@ class Distribution(ParameterModel):
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
 
-    distribution: str
-    loc: Number = 0.0
-    scale: Number = Field(1.0, gt=0.0)
-    mode: Literal["value", "factor", "offset", "uncertainty"] = "value"
-    source: str = ""
-    known: Known = "never"
+    distribution: str  # its name in scipy.stats, as norm, uniform, truncnorm
+    loc: Number = 0.0  # SciPy's: of norm the mean, of uniform the lower end
+    scale: Number = Field(1.0, gt=0.0)  # SciPy's: of norm the standard deviation, of uniform the width
+    mode: Literal["value", "factor", "offset", "uncertainty"] = "value"  # the draw itself, or how it alters the file's
+    source: str = ""  # where the figures come from
+    known: Known = "never"  # who can know it before: build, once built; day, on the day; never
 
     @model_validator(mode="after")
     def _shapes_are_numbers(self) -> Distribution:
@@ -110,9 +110,9 @@ class DispersionSection(ParameterModel):
 class DispersionFile(ParameterModel):
     """A file of such entries, for many scenarios."""
 
-    schema_version: Literal[1]
-    name: str
-    provenance: str
+    schema_version: Literal[1]  # of this kind of file; 1
+    name: str  # of these entries
+    provenance: str  # where the figures come from
     dispersion: DispersionSection
 
     @field_validator("dispersion")

@@ -37,15 +37,15 @@ class GroundSettings(ParameterModel):
     moves them, so that two flights need not find the same stone.
     """
 
-    slope_deg: Number = Field(0.0, ge=0.0, le=20.0)
-    uphill_deg: Number = Field(0.0, ge=-360.0, le=360.0)
-    step_m: Number = Field(0.0, ge=-100.0, le=100.0)
-    edge_north_m: Number = Field(1.0, ge=-1000.0, le=1000.0)
-    edge_east_m: Number = Field(0.0, ge=-1000.0, le=1000.0)
-    edge_toward_deg: Number = Field(0.0, ge=-360.0, le=360.0)
-    rough_rms_m: Number = Field(0.0, ge=0.0, le=0.2)
-    rough_length_m: Number = Field(0.3, ge=0.02, le=100.0)
-    rough_place_m: Number = Field(0.0, ge=-1e4, le=1e4)
+    slope_deg: Number = Field(0.0, ge=0.0, le=20.0)  # of the whole ground; 0: level
+    uphill_deg: Number = Field(0.0, ge=-360.0, le=360.0)  # where the slope rises to, clockwise from north
+    step_m: Number = Field(0.0, ge=-100.0, le=100.0)  # rise of the ground beyond the edge; negative: it drops
+    edge_north_m: Number = Field(1.0, ge=-1000.0, le=1000.0)  # of the pad's centre, a point on the edge
+    edge_east_m: Number = Field(0.0, ge=-1000.0, le=1000.0)  # of the pad's centre, the same point
+    edge_toward_deg: Number = Field(0.0, ge=-360.0, le=360.0)  # across the edge towards the step, clockwise from north
+    rough_rms_m: Number = Field(0.0, ge=0.0, le=0.2)  # height of the rough surface about its plane; 0: smooth
+    rough_length_m: Number = Field(0.3, ge=0.02, le=100.0)  # about the length of its waves
+    rough_place_m: Number = Field(0.0, ge=-1e4, le=1e4)  # shifts the waves, so that flights find other stones
 
     @model_validator(mode="after")
     def _pad_lies_before_the_edge(self) -> GroundSettings:
@@ -121,8 +121,8 @@ class RecirculationState(NamedTuple):
 class RecirculationSettings(ParameterModel):
     """How much of the induced velocity comes back on the ground: in the worst wind, and unsteadily; 0: nothing does."""
 
-    loss: Number = Field(0.06, ge=0.0, le=0.5)
-    unsteady: Number = Field(0.05, ge=0.0, le=0.5)
+    loss: Number = Field(0.06, ge=0.0, le=0.5)  # downward air in the worst wind, of the induced velocity; 0: none
+    unsteady: Number = Field(0.05, ge=0.0, le=0.5)  # its unsteady part, standard deviation, likewise; 0: none
 
     def parameters(
         self, diameter_m: float, hub_above_cg_m: float, air_density_kg_m3: float, hover_inflow_m_s: float

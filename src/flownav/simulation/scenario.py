@@ -28,19 +28,19 @@ SHIPPED = ("takeoff", "landing", "gusty", "pad_return", "approach")
 class Knot(ParameterModel):
     """A point of the reference path; between knots the reference moves in a straight line at constant speed."""
 
-    t_s: Number = Field(ge=0.0, le=3600.0)
-    north_m: Number = Field(0.0, ge=-1000.0, le=1000.0)
-    east_m: Number = Field(0.0, ge=-1000.0, le=1000.0)
-    height_m: Number = Field(ge=-10.0, le=120.0)
+    t_s: Number = Field(ge=0.0, le=3600.0)  # since the flight's start; later than the knot before
+    north_m: Number = Field(0.0, ge=-1000.0, le=1000.0)  # of the pad's centre; negative: south
+    east_m: Number = Field(0.0, ge=-1000.0, le=1000.0)  # of the pad's centre; negative: west
+    height_m: Number = Field(ge=-10.0, le=120.0)  # of the skids over the pad; below 0: descends until contact
 
 
 class FlightSection(ParameterModel):
     """What is flown. `start` puts the vehicle on its skids or in trimmed hover at the first knot."""
 
-    duration_s: Number = Field(50.0, ge=0.1, le=3600.0)
-    start: Literal["ground", "hover"]
-    takeoff_at_s: Number = Field(0.0, ge=0.0, le=3600.0)
-    may_land_after_s: Number | None = Field(None, ge=0.0, le=3600.0, validate_default=True)
+    duration_s: Number = Field(50.0, ge=0.1, le=3600.0)  # simulated time
+    start: Literal["ground", "hover"]  # ground: on the skids; hover: in trim, both at the first knot
+    takeoff_at_s: Number = Field(0.0, ge=0.0, le=3600.0)  # when it may leave its skids
+    may_land_after_s: Number | None = Field(None, ge=0.0, le=3600.0, validate_default=True)  # none: it never lands
     path: tuple[Knot, ...] = Field(min_length=2)
 
     @field_validator("path")
@@ -69,7 +69,7 @@ class FlightSection(ParameterModel):
 class PadSection(ParameterModel):
     """The landing pattern: a square about the origin, its sides north and east."""
 
-    size_m: Number = Field(2.0, gt=0.05, le=100.0)
+    size_m: Number = Field(2.0, gt=0.05, le=100.0)  # length of a side
 
 
 class VehicleSection(ParameterModel):
@@ -78,8 +78,8 @@ class VehicleSection(ParameterModel):
     In a scenario `vehicle = "quad-450"` is short for this section with that file.
     """
 
-    file: str | None = None
-    lens_above_skid_m: Number = Field(0.10, ge=0.0, le=2.0)
+    file: str | None = None  # a TOML file or a shipped name; none: the Maxi Joker 3
+    lens_above_skid_m: Number = Field(0.10, ge=0.0, le=2.0)  # of cameras and rangefinder; 0: level with the skids
 
 
 class FilterSection(ParameterModel):
@@ -88,22 +88,22 @@ class FilterSection(ParameterModel):
     handover_s: a vehicle that starts in hover is flown on the truth so long, while the navigator listens.
     """
 
-    name: Literal["paper", "landing"] = "landing"
+    name: Literal["paper", "landing"] = "landing"  # landing: flownav's navigator; paper: the paper's Kalman filter
     handover_s: Number = Field(5.0, ge=0.0, le=600.0)
-    start: Literal["known", "gps"] | None = None
+    start: Literal["known", "gps"] | None = None  # paper's: the true place, or the first GPS; none: as gps.model asks
 
 
 class PrecisionSection(ParameterModel):
     """The last metres of a precision landing (as PX4's): descend slowly, align above the pad's middle, then commit."""
 
-    land_height_m: Number = Field(3.0, gt=0.0, le=100.0)
-    land_speed_m_s: Number = Field(0.3, gt=0.0, le=5.0)
-    align_height_m: Number = Field(0.6, gt=0.0, le=100.0)
-    align_radius_m: Number = Field(0.03, gt=0.0, le=100.0)
-    align_speed_m_s: Number = Field(1.0, gt=0.0, le=100.0)
-    align_patience_s: Number = Field(15.0, gt=0.0, le=3600.0)
-    commit_height_m: Number = Field(0.3, ge=0.0, le=100.0)
-    search_height_m: Number = Field(0.0, ge=0.0, le=100.0)
+    land_height_m: Number = Field(3.0, gt=0.0, le=100.0)  # of the skids; below it the descent is slow
+    land_speed_m_s: Number = Field(0.3, gt=0.0, le=5.0)  # fastest descent below land_height_m
+    align_height_m: Number = Field(0.6, gt=0.0, le=100.0)  # of the skids; the gate: below it only while over the pad
+    align_radius_m: Number = Field(0.03, gt=0.0, le=100.0)  # foreseen touchdown off the pad's centre; more: wait
+    align_speed_m_s: Number = Field(1.0, gt=0.0, le=100.0)  # over the ground; faster: wait at the gate
+    align_patience_s: Number = Field(15.0, gt=0.0, le=3600.0)  # waited so long, radius and speed have doubled
+    commit_height_m: Number = Field(0.3, ge=0.0, le=100.0)  # of the skids; below it the gate stops nothing
+    search_height_m: Number = Field(0.0, ge=0.0, le=100.0)  # no lower before a camera found the pad; 0: needs none
 
 
 class GoAroundSection(ParameterModel):
@@ -113,26 +113,26 @@ class GoAroundSection(ParameterModel):
     commit_height_m.
     """
 
-    height_m: Number = Field(2.5, gt=0.0, le=100.0)
-    most: Number = Field(2.0, ge=0.0, le=100.0)
+    height_m: Number = Field(2.5, gt=0.0, le=100.0)  # of the skids over the pad, to which it climbs and waits
+    most: Number = Field(2.0, ge=0.0, le=100.0)  # how often; then it lands with what it has; 0: never goes around
     pad_view_m: Number = Field(0.5, ge=0.0, le=100.0)
-    pad_lost_s: Number = Field(2.0, gt=0.0, le=3600.0)
-    landing_sigma_m: Number = Field(0.5, gt=0.0, le=100.0)
-    doubt_s: Number = Field(2.0, ge=0.0, le=3600.0)
-    align_wait_s: Number = Field(60.0, gt=0.0, le=3600.0)
-    search_wait_s: Number = Field(30.0, gt=0.0, le=3600.0)
-    search_radius_m: Number = Field(3.0, ge=0.0, le=100.0)
-    drift_radius_m: Number = Field(0.5, gt=0.0, le=100.0)
-    drift_speed_m_s: Number = Field(0.6, gt=0.0, le=100.0)
-    clear_s: Number = Field(3.0, ge=0.0, le=3600.0)
-    aloft_most_s: Number = Field(20.0, gt=0.0, le=3600.0)
+    pad_lost_s: Number = Field(2.0, gt=0.0, le=3600.0)  # unseen for so long in that view, the pad is lost
+    landing_sigma_m: Number = Field(0.5, gt=0.0, le=100.0)  # horizontal standard deviation over the pad; more: in doubt
+    doubt_s: Number = Field(2.0, ge=0.0, le=3600.0)  # so long in doubt, or suspecting a fault, it goes around
+    align_wait_s: Number = Field(60.0, gt=0.0, le=3600.0)  # longest wait at the shut gate
+    search_wait_s: Number = Field(30.0, gt=0.0, le=3600.0)  # longest search for the pad
+    search_radius_m: Number = Field(3.0, ge=0.0, le=100.0)  # of the circle on which it looks for the pad
+    drift_radius_m: Number = Field(0.5, gt=0.0, le=100.0)  # below commit_height_m, farther from the pad: go around
+    drift_speed_m_s: Number = Field(0.6, gt=0.0, le=100.0)  # below commit_height_m, faster over ground: go around
+    clear_s: Number = Field(3.0, ge=0.0, le=3600.0)  # all must be well for so long aloft before it descends again
+    aloft_most_s: Number = Field(20.0, gt=0.0, le=3600.0)  # longest wait aloft where no camera can help
 
 
 class EventSection(ParameterModel):
     """Something that happens to the vehicle, whoever flies it. "engine cut": from then on the motor gives nothing."""
 
-    at_s: Number = Field(ge=0.0, le=3600.0)
-    kind: Literal["engine cut"]
+    at_s: Number = Field(ge=0.0, le=3600.0)  # since the flight's start
+    kind: Literal["engine cut"]  # engine cut: from then on the motor gives nothing
 
 
 _by_channel = sorted(carried_sensors(), key=lambda sensor: sensor.channels.reading)
@@ -161,11 +161,11 @@ class AutopilotSection(ParameterModel):
     it was), "origin" at the filter's origin (a vehicle that comes from elsewhere).
     """
 
-    feedback: Literal["estimate", "truth"] = "estimate"
+    feedback: Literal["estimate", "truth"] = "estimate"  # what it flies on: the filter's estimate, or the truth
     home: Literal["start", "origin"] = "start"
-    position_gain_1_s: Number | None = Field(None, gt=0.0, le=5.0)
-    velocity_gain_1_s: Number | None = Field(None, gt=0.0, le=10.0)
-    velocity_integral_1_s2: Number | None = Field(None, ge=0.0, le=10.0)
+    position_gain_1_s: Number | None = Field(None, gt=0.0, le=5.0)  # speed per position error; none: the vehicle's
+    velocity_gain_1_s: Number | None = Field(None, gt=0.0, le=10.0)  # acceleration per speed error; none: the vehicle's
+    velocity_integral_1_s2: Number | None = Field(None, ge=0.0, le=10.0)  # per position error; none: the vehicle's
     precision: PrecisionSection | None = None
     go_around: GoAroundSection | None = None
 
@@ -176,24 +176,24 @@ class AutopilotSection(ParameterModel):
             raise ValueError("needs [autopilot.precision], the landing that is broken off")
         return value
 
-    idle_collective_deg: Number = Field(0.0, ge=-10.0, le=10.0)
+    idle_collective_deg: Number = Field(0.0, ge=-10.0, le=10.0)  # on the skids, rotor turning; helicopters only
 
 
 class Scenario(ParameterModel):
     """A scenario file."""
 
-    schema_version: Literal[1]
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
-    description: str = ""
+    schema_version: Literal[1]  # of this kind of file; 1
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")  # of the results: letters, digits, . _ and -
+    description: str = ""  # one sentence, shown in lists and reports
     paper_table: Literal[5, 6] | None = None  # the published table that the flight's errors are set beside
-    truth: Literal["nonlinear", "linear"] = "nonlinear"
+    truth: Literal["nonlinear", "linear"] = "nonlinear"  # the vehicle's equations, or the paper's linear model
     optics: Literal["model", "pixels"] = "model"  # of the pad camera, for `flownav fly`
     flight: FlightSection
     pad: PadSection = PadSection()
     vehicle: VehicleSection = VehicleSection()
     gps: GpsInsSettings = GpsInsSettings(model="white")
     flow: FlowSettings = FlowSettings()
-    flow_sensor: str | None = None
+    flow_sensor: str | None = None  # its file, as `flownav identify` writes; none: the paper's PX4FLOW
     rangefinder: RangefinderSettings = RangefinderSettings()
     sensors: SensorsSection = SensorsSection()
     pad_fix: PadFixSettings | None = None

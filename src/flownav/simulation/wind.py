@@ -259,10 +259,10 @@ class WindSettings(ParameterModel):
     (a meadow) to .1 (low crops), after Davenport and Wieringa.
     """
 
-    speed_20ft_m_s: Number = Field(0.0, ge=0.0, le=30.0)
-    from_direction_deg: Number = Field(0.0, ge=-360.0, le=360.0)
-    gusts: bool = True
-    reference_height_m: Number = Field(3.0, ge=LOWEST_HEIGHT_M, le=300.0)
+    speed_20ft_m_s: Number = Field(0.0, ge=0.0, le=30.0)  # steady speed at 20 ft (6.1 m) over the ground; 0: no wind
+    from_direction_deg: Number = Field(0.0, ge=-360.0, le=360.0)  # where it blows from, clockwise from north
+    gusts: bool = True  # whether there is Dryden turbulence (MIL-F-8785C)
+    reference_height_m: Number = Field(3.0, ge=LOWEST_HEIGHT_M, le=300.0)  # the gusts' size and length are its
     roughness_m: Number = Field(ROUGHNESS_M, ge=1e-4, le=0.4)
 
     def parameters(self, span_m: float = SPAN_M) -> WindParameters:

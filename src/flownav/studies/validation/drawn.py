@@ -40,8 +40,8 @@ Window = tuple[float, float]
 class RecordedFlight(ParameterModel):
     """A log's folder, and its GPS outages: `[T0, T1, LENGTH]` each, seconds of the log."""
 
-    log: str
-    windows_s: tuple[tuple[Number, Number, Number], ...] = Field(min_length=1)
+    log: str  # name of the log's folder
+    windows_s: tuple[tuple[Number, Number, Number], ...] = Field(min_length=1)  # from T0 on, each LENGTH long, to T1
 
     def windows(self) -> list[Window]:
         """Each outage [s]. InputError where one cannot be."""
@@ -51,22 +51,22 @@ class RecordedFlight(ParameterModel):
 class AssumedVehicle(ParameterModel):
     """What sensor models ask of a vehicle and a log does not tell; path_bandwidth_hz: of the path that is flown."""
 
-    thrust_n: Number = Field(gt=0.0, le=1e4)
-    rotor_radius_m: Number = Field(gt=0.0, le=10.0)
-    rotor_speed_rad_s: Number = Field(gt=0.0, le=1e4)
-    rotor_speed_spread: Number = Field(ge=0.0, lt=1.0)
-    blades: Number = Field(ge=1.0, le=12.0)
-    hover_power_w: Number = Field(ge=0.0, le=1e5)
-    path_bandwidth_hz: Number = Field(gt=0.1, le=5.0)
-    flow_max_height_m: Number = Field(gt=0.0, le=1000.0)
+    thrust_n: Number = Field(gt=0.0, le=1e4)  # of all rotors, all the time; for the wash on the barometer
+    rotor_radius_m: Number = Field(gt=0.0, le=10.0)  # of a disc as large as all rotors' together
+    rotor_speed_rad_s: Number = Field(gt=0.0, le=1e4)  # of one rotor, for the tones of vibration
+    rotor_speed_spread: Number = Field(ge=0.0, lt=1.0)  # flights differ by up to this share, either way
+    blades: Number = Field(ge=1.0, le=12.0)  # of one rotor, for the tones of vibration
+    hover_power_w: Number = Field(ge=0.0, le=1e5)  # electrical, all the time; for the field of its current
+    path_bandwidth_hz: Number = Field(gt=0.1, le=5.0)  # of the path that is flown; quicker motion is left out
+    flow_max_height_m: Number = Field(gt=0.0, le=1000.0)  # of the flow camera, instead of the sensor file's
 
 
 class ValidationFile(ParameterModel):
     """The file of flights."""
 
-    schema_version: Literal[1]
-    name: str
-    provenance: str
+    schema_version: Literal[1]  # of this kind of file; 1
+    name: str  # of these flights
+    provenance: str  # where the logs and figures come from
     flight: tuple[RecordedFlight, ...] = Field(min_length=1)
     vehicle: AssumedVehicle
 

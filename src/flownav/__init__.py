@@ -4,8 +4,6 @@ The public API: `fly`, `replay`, `identify`, `campaign` and `load` give a `Recor
 `Scenario`, `Sensor` and `Vehicle` are what they take. Each is loaded when it is first asked for.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

@@ -1,7 +1,5 @@
 """What calls of the API share: how one is written down, parts of one's own, entries of files and their changes."""
 
-from __future__ import annotations
-
 import atexit
 import hashlib
 import inspect

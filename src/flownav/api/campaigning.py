@@ -1,7 +1,5 @@
 """campaign: a scenario flown many times, swept and dispersed: figures with intervals, flights, rare events."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence

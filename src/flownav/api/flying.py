@@ -1,7 +1,5 @@
 """fly: a scenario flown in closed loop, one flight or many, as records with their scores."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """How a record shows itself: two lines on a terminal, a small table in a notebook, plain figures of `Record.plot`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from typing import Any, NamedTuple

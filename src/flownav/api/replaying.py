@@ -1,7 +1,5 @@
 """replay: a recorded flight through the navigator, as a record with its scores."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Another estimate in the place of a record's own, checked, and scored by the functions that score ours."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

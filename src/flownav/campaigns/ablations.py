@@ -6,8 +6,6 @@ There is no variant without "ground-effect knowledge", since the navigator has n
 that the ground adds. There is none without an IMU, either: nothing else tells the attitude.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What the navigator promises, case by case, and whether it keeps it (docs/explanation/accuracy.md)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple

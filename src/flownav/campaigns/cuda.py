@@ -6,8 +6,6 @@ Flights are flown so many at once; their scores come back and nothing else. Of a
 CPU, as everywhere, while the device flies the flights before.
 """
 
-from __future__ import annotations
-
 import multiprocessing
 import pickle
 from collections.abc import Callable, Iterator, Sequence

@@ -4,8 +4,6 @@ A thread flies the scalar build, `ONE_LANE`, of the same equations as the CPU; i
 (`compile.strided`). No history leaves the device: scores are kept epoch by epoch (`scoring.running`).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

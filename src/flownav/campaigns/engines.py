@@ -4,8 +4,6 @@ The cluster is the one that RAY_ADDRESS names, else one of this machine's cores.
 and gives its rows back. What it needs (vehicle, sensors, scenario) goes with it: workers read no file of the user's.
 """
 
-from __future__ import annotations
-
 import logging
 import os
 import secrets

@@ -5,8 +5,6 @@ at its horizon, some 0.1 s ago and in its own frame, which GPS has put somewhere
 only there the two can be held against each other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

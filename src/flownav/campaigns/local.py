@@ -1,7 +1,5 @@
 """Flights on this machine, scored as they land, and a scenario's envelope."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any

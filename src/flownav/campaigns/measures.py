@@ -8,8 +8,6 @@ misses more often than one time in twenty. So the looks are planned, and each of
 Bonferroni's inequality the interval at which a campaign stops holds with its confidence, whenever that is.
 """
 
-from __future__ import annotations
-
 import re
 from typing import Any, NamedTuple
 

@@ -7,8 +7,6 @@ the pad camera's model, and the flight is flown again from its start, a frame or
 flown on what its detector saw, exactly. Every other sensor is the model's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise

@@ -5,8 +5,6 @@ of how many flights the campaign has. Hypercubes and sequences are of `TOGETHER`
 independent of each other: a flight's inputs can be had without those of a million others.
 """
 
-from __future__ import annotations
-
 import hashlib
 import itertools
 import json

@@ -14,8 +14,6 @@ over the n rows. Indices of a group are the same, the whole group out of B.
 Noise is by counter: flights 0 to n - 1 have the noise of A, flights n to 2n - 1 that of B.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """A campaign flown, cell by cell, until all flights are there or are enough; and one flight of it again."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What a campaign found: figures of every cell with their intervals, what became of its flights, views, the worst."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping
 from typing import Any, NamedTuple

@@ -11,8 +11,6 @@ Hanson and Beard, NASA TP-2010-216447). Flights spread evenly over several cells
 variably than a binomial says (Hoeffding, Ann. Math. Stat. 27, 1956), so that the risk stated here is not exceeded.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Literal, NamedTuple
 

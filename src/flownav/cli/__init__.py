@@ -1,7 +1,5 @@
 """The command line: one module per command, each importing its job only when it is called; how it runs and ends."""
 
-from __future__ import annotations
-
 import io
 import sys
 from importlib import import_module

@@ -1,7 +1,5 @@
 """`flownav bench`: how fast this machine runs flownav, measured in one run; `flownav schema`: what commands print."""
 
-from __future__ import annotations
-
 import json
 from typing import Annotated, Any
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from flownav.campaigns.run import place_of
 from flownav.cli.tables import Column, answer, say, table_of, with_ends
 
 if TYPE_CHECKING:
@@ -70,6 +69,8 @@ def watching(plan: Plan) -> Iterator[Callable[[CampaignProgress], None]]:
 
 def show(summary: dict[str, Any], folder: Path, rate: float | None, records: list[str]) -> None:
     """The table, the worst flights, and where everything lies."""
+    from flownav.campaigns.run import place_of
+
     cells = summary["cells"]
     lands = any("r95_m" in cell["figures"] for cell in cells)
     figures = [_of_figure(title, name) for name, title in (LANDED if lands else ALOFT).items()]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from flownav.campaigns.run import engine_named, require_engine
 from flownav.cli import options
 from flownav.cli.options import argument, option, out_option, switch
 from flownav.cli.tables import Column, answer, figure, say, table_of
@@ -54,6 +53,7 @@ def command(
     from flownav.campaigns.certification.certify import TOLD
     from flownav.campaigns.ranking import LEAST
     from flownav.campaigns.requirement import load_requirement
+    from flownav.campaigns.run import engine_named, require_engine
     from flownav.cli.output import require_between
     from flownav.core.errors import VerdictError
 

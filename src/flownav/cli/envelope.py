@@ -1,7 +1,5 @@
 """`flownav envelope`: how surely a scenario lands, over the wind's speed and direction."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 

@@ -1,7 +1,5 @@
 """`flownav info`: what a log holds, before anything is done with it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from flownav.cli import options

@@ -5,8 +5,6 @@ The words to choose from stand here because a shell's completion may load nothin
 their rooms.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path

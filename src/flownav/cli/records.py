@@ -1,7 +1,5 @@
 """`flownav report`, `view`, `export` and `recover`: what is made of a record, and a record made of a journal."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

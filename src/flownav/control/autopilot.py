@@ -6,8 +6,6 @@ integration) and while the skids carry the weight. The outer loop runs on the fi
 truth), the inner loop on the INS attitude and the flybarless unit's gyros.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from flownav.control import go_around

@@ -11,8 +11,6 @@ the inflow held, too; both axes have the same. A share of the rotors' thrust giv
 where a cyclic gives it a rate.
 """
 
-from __future__ import annotations
-
 import math
 
 from flownav.control.gains import AutopilotGains

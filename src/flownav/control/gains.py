@@ -1,7 +1,5 @@
 """The autopilot's gains and limits, as the flight kernel takes them."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 

@@ -11,8 +11,6 @@ found it, over ground that its range knows.
 Last: what is brought over the pad, and the gate before the touchdown.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from flownav.control.gains import AutopilotGains

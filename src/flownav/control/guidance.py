@@ -6,8 +6,6 @@ constant acceleration: a corner that no vehicle can fly is one that it overshoot
 ground until the skids report contact.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -15,8 +15,6 @@ sampling, holding and the estimate's delay (whole periods of the outer loop) inc
 frequency responses, are proven on it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

@@ -17,8 +17,6 @@ Floating-point contraction is off, so that a flight has the same bytes alone, in
 number of threads.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -3,8 +3,6 @@
 What a user names to be written goes through `guard`, which also asks what is there already.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import re

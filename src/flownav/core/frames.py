@@ -3,8 +3,6 @@
 Quaternions are Hamilton, body to earth, `(w, x, y, z)`. Euler angles are Z-Y-X (yaw, pitch, roll), radians.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

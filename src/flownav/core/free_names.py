@@ -3,8 +3,6 @@
 `out/landing.fnr` is there: the next one is `out/landing-1.fnr`, with its report `out/landing-1.html`.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterable, Sequence
 from glob import escape

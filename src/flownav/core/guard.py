@@ -5,8 +5,6 @@ Readers pass every path through `an_input` before they open it. What a user name
 read is remembered, so that a file which another file names is held to be an input too.
 """
 
-from __future__ import annotations
-
 import mmap
 import os
 import stat

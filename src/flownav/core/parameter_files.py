@@ -5,8 +5,6 @@ A number may stand bare, `radius_m = 0.89`, or with its provenance,
 A file's schema is a pydantic model of `Number` fields with their allowed ranges.
 """
 
-from __future__ import annotations
-
 import math
 import tomllib
 from collections.abc import Callable, Mapping

@@ -4,8 +4,6 @@ Its footer and the headers of its pages are read here, and held against each oth
 apache/parquet-format): pyarrow believes both, and ends the process at some footers that are damaged.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 MAGIC = b"PAR1"

@@ -1,7 +1,5 @@
 """Where a result came from: versions, inputs and their hashes, and the command that made it."""
 
-from __future__ import annotations
-
 import hashlib
 import platform
 import shlex

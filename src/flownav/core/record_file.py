@@ -5,8 +5,6 @@ Parquet footers, the pages' headers) is checked first. A flight of two hours wit
 memory, a file of some 0.8 GB).
 """
 
-from __future__ import annotations
-
 import io
 import json
 import re

@@ -3,8 +3,6 @@
 `$id` has a schema's name and number; the number stands in every object as `schema`. `flownav schema NAME` prints one.
 """
 
-from __future__ import annotations
-
 import json
 from importlib import resources
 from typing import Any

@@ -1,12 +1,9 @@
 """Numbers, names and nested dictionaries as text; the TOML is read back by `parameter_files`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
+from numbers import Integral
 from typing import Any
-
-import numpy as np
 
 
 def number(text: str) -> float:
@@ -74,7 +71,7 @@ def _literal(value: Any) -> str:
         return _quoted(value)
     if isinstance(value, Sequence):
         return "[" + ", ".join(_literal(item) for item in value) + "]"
-    if isinstance(value, int | np.integer):
+    if isinstance(value, Integral):
         return str(int(value))
     number = float(value)
     return repr(number) if math.isfinite(number) else "nan"

@@ -1,7 +1,5 @@
 """The attitude error, three of the filter's states: what a correction makes of it belongs into the quaternion."""
 
-from __future__ import annotations
-
 from flownav.core.compile import Lanes, Work, procedure
 from flownav.core.frames import of_unit_length, quaternion_product
 from flownav.estimation.states import ATTITUDE, QUATERNION, STATE

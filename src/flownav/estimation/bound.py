@@ -5,8 +5,6 @@ Muravchik and Nehorai, Posterior Cramér-Rao bounds for discrete-time nonlinear 
 Processing 46(5), 1998, equations 21 and 34-36. A nonlinear model hands in its Jacobians along the truth.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

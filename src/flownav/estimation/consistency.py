@@ -1,7 +1,5 @@
 """How far the truth lies from what the filter says, in units of what it states."""
 
-from __future__ import annotations
-
 from flownav.core.compile import Lanes, Work, equation
 from flownav.estimation.covariance import covariance_of
 from flownav.estimation.states import SCRATCH, STATE

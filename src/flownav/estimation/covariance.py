@@ -6,8 +6,6 @@ the flow sensor's dynamics are carried. Observations are scalars, fused one afte
 noise is the joint update and inverts nothing. A lane that is not offered a reading, or refuses it, keeps every bit.
 """
 
-from __future__ import annotations
-
 from typing import cast
 
 from flownav.core.compile import Lanes, Work, equation, procedure

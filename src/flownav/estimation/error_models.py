@@ -7,8 +7,6 @@ section 3.2 and appendix B.4). Motion neither reads nor drives the Gauss-Markov 
 together, later, for as long as no law has read them in between.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -3,8 +3,6 @@
 The codes are stable: kernels write them, records keep their names. Nothing is rejected without one.
 """
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 

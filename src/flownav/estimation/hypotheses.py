@@ -12,8 +12,6 @@ Automatic Control 21(1), 1976).
 What the filter estimates by itself leaves no trace in c: a flow scale that is learnt is no fault.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

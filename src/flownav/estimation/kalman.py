@@ -7,8 +7,6 @@ processed one scalar component at a time, which for uncorrelated noise is algebr
 and needs no matrix inverse. A component that is not offered or fails its test leaves the lane as it was.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ as well as what is. Only a filter of STATES_WITH_LAG states has them: `lag_start
 one step of it, which `predict_with_lag` takes.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ Navigation Systems, 2013, section 5.4, on a flat, non-rotating earth); their err
 the earth frame. docs/explanation/landing-filter.md derives both.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from flownav.core.compile import Lanes, Work, equation, procedure

@@ -1,7 +1,5 @@
 """What laws are told, as records: their fields are names of states and rows, or of numbers that a caller passes."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from flownav.core.compile import equation

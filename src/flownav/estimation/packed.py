@@ -1,7 +1,5 @@
 """The packed covariance of a lane as a matrix and back, for Python's callers."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -7,8 +7,6 @@ that did not arrive (flow not engaged) are left out. There is no innovation test
 open.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

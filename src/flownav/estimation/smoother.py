@@ -7,8 +7,6 @@ without variance and states that were reset do no harm. Process noise has no par
 covariances.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from flownav.core.compile import equation, exp, kernel

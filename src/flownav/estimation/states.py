@@ -11,8 +11,6 @@ show. Laws name states by the short names of `SHORT_NAMES`, or by the vectors of
 Row r of lane k lies at `work[r * len(lanes) + k]`. The filter's rows are the first of the buffer; others may follow.
 """
 
-from __future__ import annotations
-
 from itertools import product
 
 POSITION = 0  # 3, local NED [m]

@@ -5,8 +5,6 @@ applied to each column of P and then, on the block of its own states, to each ro
 one pass and multiplies by no zero.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from itertools import combinations_with_replacement, pairwise

@@ -1,7 +1,5 @@
 """Every format by name: where its file or folder goes, and who writes it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import NamedTuple
 

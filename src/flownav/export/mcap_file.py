@@ -6,8 +6,6 @@ message schema reference gives them. `foxglove_layout.json` is the whole layout,
 that lacks something the curves and panels that would stay empty are left out.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterator, Mapping

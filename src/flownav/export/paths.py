@@ -9,8 +9,6 @@ KML 2.2 with gx:Track (https://developers.google.com/kml/documentation/kmlrefere
 release is of 2021, and no writer would know more of a track than its points.
 """
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from contextlib import ExitStack

@@ -1,7 +1,5 @@
 """A record's own tables as a folder of Parquet or CSV files beside its manifest.json, and whole numbers of time."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math

@@ -1,7 +1,5 @@
 """The paths of a record as poses, in NED/FRD or in ENU/FLU, and the estimate's error where the record holds a truth."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ order; only the offsets of what the vehicle appended (crash dumps) grow by what 
 To append our data in that way too would be simpler, but PlotJuggler and PX4's replay ignore appended data.
 """
 
-from __future__ import annotations
-
 import struct
 from itertools import pairwise
 from pathlib import Path

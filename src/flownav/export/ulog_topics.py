@@ -6,8 +6,6 @@ PX4's own name where one fits, `flownav_...` else. Of PX4's topics those fields 
 (ULog describes itself, and readers look fields up by name); frames and units are PX4's, which are ours.
 """
 
-from __future__ import annotations
-
 import re
 import struct
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """The estimate of now, whether it may be sent, and what is said to a vehicle."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Links that are streams of bytes, TCP and serial ports, and whatever link a URL names."""
 
-from __future__ import annotations
-
 import errno
 import os
 import select

@@ -1,7 +1,5 @@
 """The navigator behind the horizon: what it is fed, in batches of one queue, and what comes of it."""
 
-from __future__ import annotations
-
 from collections import deque
 from typing import NamedTuple
 

@@ -3,8 +3,6 @@
 And where the local frames begin: the navigator's, which never moves, and the autopilot's, which it may set late.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable

@@ -5,8 +5,6 @@ instant must have arrived, as long as the slowest stream runs behind the newest 
 sensor that is heard and does not serve is an alarm, since what is sent then rests on less than the vehicle has.
 """
 
-from __future__ import annotations
-
 import heapq
 from collections import Counter, deque
 from collections.abc import Iterable

@@ -5,8 +5,6 @@ the line's pace, and no estimate that is old: a line that is full is no reason t
 second ago. Of estimates the newest unsent one stands for all before it, and what does not go out is counted.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import select

@@ -3,8 +3,6 @@
 Before it begins kernels are loaded, and the process asks to run before others where the system permits it.
 """
 
-from __future__ import annotations
-
 import gc
 import os
 import signal

@@ -1,7 +1,5 @@
 """What a live session is asked to do, and the limits within which it sends."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal, get_args
 

@@ -6,8 +6,6 @@ navigator rests on last: inertial readings, flow, range and GPS. A serial line c
 bytes.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from flownav.logs.mavlink.framing import ARDUPILOT, PX4

@@ -4,8 +4,6 @@ Whole frames, signed where a key is asked for, of the sources accepted; stamps l
 where it answers.
 """
 
-from __future__ import annotations
-
 import re
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator

@@ -5,8 +5,6 @@ own; `finish` makes the Record of the journal, and then removes that. A session 
 which `flownav recover` makes the same Record. A journal that cannot be written ends the recording, not the session.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """A journal becomes a Record: when its session ends, and when its session was killed."""
 
-from __future__ import annotations
-
 import mmap
 from pathlib import Path
 from typing import Annotated, Any, Generic, NamedTuple, TypeVar

@@ -5,8 +5,6 @@ nothing, or that there is none. PX4's says so in its HEARTBEAT (MAV_MODE_FLAG_HI
 is one. A vehicle is not asked for a truth that it does not have: ArduPilot would complain to every ground station.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any, NamedTuple
 

@@ -5,8 +5,6 @@ at the horizon until all of their instant must be here, and are then fed to the 
 carried on to now, is sent where nothing speaks against it (answers).
 """
 
-from __future__ import annotations
-
 from collections import Counter, deque
 
 from flownav.core.measurement import Sensor

@@ -4,8 +4,6 @@ What its own sensors read goes out when it arrived, and the attitude that its au
 MAV_CMD_SET_MESSAGE_INTERVAL, and tells the truth (SIM_STATE), so that what comes back can be judged.
 """
 
-from __future__ import annotations
-
 import heapq
 from collections import Counter, deque
 from typing import Any, NamedTuple

@@ -4,8 +4,6 @@ A record has a name that nobody has, and a journal beside it that nobody else wr
 within a second, and nobody waits.
 """
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import os

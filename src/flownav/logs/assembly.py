@@ -1,7 +1,5 @@
 """From a reader's columns to a Stream: rows in time order; what cannot be is thrown away and counted in any format."""
 
-from __future__ import annotations
-
 import hashlib
 from bisect import bisect_right
 from collections.abc import Sequence

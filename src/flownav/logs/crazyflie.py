@@ -18,8 +18,6 @@ N_x/10 = dt Npix/thetapix (v_x/z - w_y), N_y/10 = dt Npix/thetapix (v_y/z + w_x)
 flow_y = w_y + v_x/z and flow_x = w_x - v_y/z.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ PX4's sensor convention. Sensors a folder lacks are left out; one of `attitude.c
 `gps.csv`, `flow.csv`, `px4flow.csv` must be there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

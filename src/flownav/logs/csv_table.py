@@ -4,8 +4,6 @@ Bad rows are thrown away and counted by reason. Where so many are bad that the f
 names say (a wrong unit, two logs in one file), that is an InputError of one line.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

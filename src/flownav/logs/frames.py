@@ -5,8 +5,6 @@ FLU to an earth with z up becomes one of body FRD to NED: from east-north-up bot
 (a heading counted from x) both are half-turned about x. REP 103 (https://www.ros.org/reps/rep-0103.html) has ROS's.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from flownav.core.frames import quaternion_product, rotation_from_quaternion, to_body

@@ -6,8 +6,6 @@ that its `rows` name with their shapes. Nothing is ever written over, so that a 
 every block before the cut; after damage in the middle the next block is found by its mark.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import struct

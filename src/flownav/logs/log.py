@@ -1,7 +1,5 @@
 """Log: what every reader yields, and what replay takes; what a log lacks, in the same words for every format."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -3,8 +3,6 @@
 docs/reference/mavlink.md lists the messages, their units and traps.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from pathlib import Path
 from typing import Any, NamedTuple

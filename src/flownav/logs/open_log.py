@@ -1,7 +1,5 @@
 """Any recorded flight as a Log: what a path holds is told from its first bytes, its reader is imported then."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path

@@ -6,8 +6,6 @@ attitude turns, the GPS velocity must integrate to the GPS position. The bounds 
 axis or sign breaks them, never a bad sensor.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 

@@ -4,8 +4,6 @@ What the navigator of a live session or of a simulated flight was fed is fed aga
 is exact; of a replayed log the streams are read.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

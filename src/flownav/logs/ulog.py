@@ -4,8 +4,6 @@ What PX4 says in float or integer, degrees or 1e-7 degrees, radians accumulated 
 definitions: PX4-Autopilot, msg/. The page is docs/reference/logs.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

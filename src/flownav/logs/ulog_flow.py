@@ -6,8 +6,6 @@ the same under other names (its driver turned it into body axes); `sensor_optica
 which SENS_FLOW_ROT turns by eighths about z, as PX4's VehicleOpticalFlow does to make `vehicle_optical_flow`.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -6,8 +6,6 @@ against what the definitions say of it, damage is skipped and counted, and only 
 kept, as places in the file. Format: docs.px4.io, "ULog File Format".
 """
 
-from __future__ import annotations
-
 import re
 import struct
 from collections.abc import Collection

@@ -1,7 +1,5 @@
 """What a ULog holds to compare with: ground truth, visual odometry, and what the autopilot itself estimated."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

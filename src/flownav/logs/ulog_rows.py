@@ -1,7 +1,5 @@
 """The data messages of a ULog by the million: where they lie, and one field of all of them, in compiled loops."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

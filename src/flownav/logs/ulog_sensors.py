@@ -1,7 +1,5 @@
 """GPS, inertial, attitude, air, magnetic and landing topics of a ULog as streams."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from flownav.core.frames import rotation_from_quaternion, to_body

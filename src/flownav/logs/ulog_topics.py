@@ -1,7 +1,5 @@
 """The topics of a ULog file as rows: pyulog decodes what the framing lets through, the clock is put in order."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 from collections.abc import Collection, Iterable

@@ -5,8 +5,6 @@ flies on, must be of now. One step is `carried`, the very law that moves the fil
 one lane here and on the simulator's; its covariance is moved by that motion's own transition and noise.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

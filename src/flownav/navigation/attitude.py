@@ -1,7 +1,5 @@
 """An external attitude: all of it where there is no IMU, else its heading, where down is, and the way across a gap."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pressure heights: the barometer with its offset, which the first reading finds."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ is no longer heard, and the heading is sought from the course. Where only the fl
 nothing is done.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

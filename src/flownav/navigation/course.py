@@ -6,8 +6,6 @@ a Kalman filter, which takes errors for small, would lose itself where it is lar
 the heading (`take.consider_datum`), and the flow, by whose variance so large a doubt counts, tells little.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

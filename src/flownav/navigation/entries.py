@@ -1,7 +1,5 @@
 """The entries of a smoother's journal, by name; the first number of each says which kind it is."""
 
-from __future__ import annotations
-
 from typing import Annotated, Generic, NamedTuple, TypeVar
 
 from flownav.core.compile import places_of, row_store, row_view, width_of

@@ -1,7 +1,5 @@
 """From streams to a navigator that is ready for them: which sensors serve."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from flownav.core.measurement import Array, Sensor, Stream

@@ -1,7 +1,5 @@
 """Warnings that stand: from the happening that raises one to the one that takes it down."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Optical flow readings: angular rates less the vehicle's turning, or the sensor's own metric velocity."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

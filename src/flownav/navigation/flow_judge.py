@@ -1,7 +1,5 @@
 """The verdict on a flow reading, and the turning that it saw: laws of one reading, its memory and the settings."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from flownav.core.compile import cos, equation, exp, larger, replacing, smaller

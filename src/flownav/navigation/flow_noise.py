@@ -2,8 +2,6 @@
 innovations show, as a factor.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from flownav.core.compile import clamp, equation, larger, smaller

@@ -1,7 +1,5 @@
 """GPS position and velocity: a fix is judged as a whole, fused axis by axis, and believed where refused for long."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

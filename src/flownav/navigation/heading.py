@@ -1,7 +1,5 @@
 """Headings: what becomes of one that is read, a magnetometer's, and one that comes from elsewhere."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Ranges: height over ground whose level is a state."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

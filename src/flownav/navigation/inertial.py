@@ -1,7 +1,5 @@
 """Inertial readings: which of them are sound, what stands for the time between two, and what moves the filter when."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

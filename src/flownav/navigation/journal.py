@@ -3,8 +3,6 @@
 A journal of no rows is written nowhere and only counts; that is what a run without a smoother has. It is of one lane.
 """
 
-from __future__ import annotations
-
 from flownav.core.compile import ONE_LANE, Lanes, Work, gathering, procedure, row_of
 from flownav.estimation.covariance import covariance_of, forget_lane, states_of
 from flownav.estimation.states import (

@@ -1,7 +1,5 @@
 """A flow sensor whose dynamics are states of the filter (`estimation.lag`): its law, its step and its start."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from flownav.core.compile import Lanes, Work, equation

@@ -1,7 +1,5 @@
 """One vehicle's readings in the order of their instants: a queue through the navigator, on one lane."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

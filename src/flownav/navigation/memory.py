@@ -4,8 +4,6 @@
 memories, and a few scalars that all lanes share, since the schedule of readings is the same in all of them.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from flownav.core.compile import Lanes, Layout, Work, equation

@@ -1,7 +1,5 @@
 """Offering one component to the filter on lanes: the test, what is written of it, and what follows for the aids."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The navigator's settings as one array of numbers, and the equations that take each subject's part of it."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where the vehicle is from something near it: an external pose, the pad in a camera, the ground under the skids."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -7,8 +7,6 @@ followed instead of one filter for each hypothesis. Unlike there no probability 
 docs/explanation/integrity.md measures how often the error is beyond the level.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from flownav.core.compile import Lanes, Work, equation, exp, larger, procedure, replacing, row_of, smaller

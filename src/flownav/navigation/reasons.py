@@ -2,8 +2,6 @@
 checks that all sensors have in common; what it means that a sensor speaks and does not serve.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from flownav.core.compile import equation

@@ -3,8 +3,6 @@
 A field's default is what it is before anything was heard.
 """
 
-from __future__ import annotations
-
 from math import inf, nan
 from typing import NamedTuple
 

@@ -3,8 +3,6 @@
 The defaults are for any small VTOL with consumer sensors. None is fitted to a log.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

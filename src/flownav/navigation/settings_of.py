@@ -5,8 +5,6 @@ Standard deviations that a sheet gives for units of its kind become the filter's
 in sheets and two-sided in the filter, where white noise of density N lets its integral's variance grow by N^2 t/2.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

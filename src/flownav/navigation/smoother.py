@@ -5,8 +5,6 @@ copy of that buffer every EVENTS_AT_ONCE events, then, from the last chunk to th
 and backward through that. Memory is a copy a chunk, one chunk's journal, and the result.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

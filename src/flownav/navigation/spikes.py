@@ -6,8 +6,6 @@ meanwhile is added to its doubt, so that flow and GPS find it anew. An IMU that 
 A `Witness` judges so beside the filter: for the flow's turning, and for the carrying to now.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How a navigator starts: a first attitude, and a fix or the local origin."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

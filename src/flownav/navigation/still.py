@@ -6,8 +6,6 @@ shows no motion, has no velocity worth the name; nor does it turn much, so that 
 within SHAKEN_TURN_RAD_S and what its shaking leaves in a mean. Nothing is taught above the height of contact.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

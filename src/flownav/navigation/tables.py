@@ -1,7 +1,5 @@
 """What a navigator was fed and what it wrote, as the tables of a record: the same for replay, live and simulation."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ simulator's on one or sixteen. The schedule (which sensor, at what instant) is t
 whether it arrived, and every verdict are each lane's own.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

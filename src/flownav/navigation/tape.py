@@ -5,8 +5,6 @@ written at the same instants in all lanes (their schedule is the same); a lane t
 for its time, or the reason SILENT. Happenings come when they come, lane by lane. A tape without rows only counts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 

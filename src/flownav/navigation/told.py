@@ -3,8 +3,6 @@
 `settings.NavigatorSettingsFile` documents each key and makes these of a file.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from flownav.core.compile import equation

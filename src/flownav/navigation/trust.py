@@ -6,8 +6,6 @@ larger, not alike; motion that errs, as by an accelerometer that vibration recti
 likeness over blocks of time, and not their size, moves the accelerometer's noise, up and down again.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ A judge is `judge(reading, what the filter says, memory, settings) -> verdict` o
 belongs. Nothing is left in rows for a later function to find.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ contradicts the motion while nothing else tells the height. Either lets the acce
 limit, so that range, barometer or GPS keep the velocity.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

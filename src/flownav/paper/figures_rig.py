@@ -1,7 +1,5 @@
 """The paper's figures 2, 3, 8, 10 to 13 and 15 from the synthetic rig; plain figures, something against something."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

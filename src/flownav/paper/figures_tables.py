@@ -1,7 +1,5 @@
 """Tables 1 and 2 as pictures, and figures 17 to 31: the report's own panels of the median take-off and landing."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -3,8 +3,6 @@
 Those marked `decides` make the command's exit status 1 where they do not agree.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Section V of the paper: many take-offs and landings, scored as Tables 5 and 6 are, and one of each to draw."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple

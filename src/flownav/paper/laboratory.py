@@ -5,8 +5,6 @@ height (the last on the first), which it has not seen. The selected model is the
 paper's; at its own height it is not judged on the run that it comes from.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple

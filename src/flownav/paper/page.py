@@ -1,7 +1,5 @@
 """The reproduction as tables for people and as one self-contained HTML page, in the report's looks."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from rich.console import Console

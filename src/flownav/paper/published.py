@@ -3,8 +3,6 @@
 Tables 5 and 6 are `scoring.paper_tables`.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 from typing import NamedTuple

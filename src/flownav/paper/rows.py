@@ -1,7 +1,5 @@
 """Rows of Tables 1 to 3 and of the tables about the rig, as text for the page and the terminal."""
 
-from __future__ import annotations
-
 import re
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """The words, tiles and table rows of the page; figures of merit come from the reproduction, none is written here."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Python called from compiled loops: C functions with an address, whose first mistake is kept and told afterwards."""
 
-from __future__ import annotations
-
 import ctypes
 import inspect
 from collections.abc import Callable

@@ -3,8 +3,6 @@
 A campaign flies them one after the other, or, where they are equations, on lanes.
 """
 
-from __future__ import annotations
-
 import copy
 import hashlib
 import inspect

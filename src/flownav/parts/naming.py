@@ -4,8 +4,6 @@ A package offers a filter as `[project.entry-points."flownav.filters"] mine = "p
 named `path/to/file.py:Class`, and a module's `package.module:Class`.
 """
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 import sys

@@ -3,8 +3,6 @@
 Readings are replaced on their way into the navigator and into the record.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -3,8 +3,6 @@
 Everything is in the frames of the rest of flownav: earth NED, body FRD, SI units, Hamilton quaternions body to earth.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from typing import NamedTuple, Protocol, runtime_checkable

@@ -1,7 +1,5 @@
 """A log through a filter of somebody else's, in our navigator's place."""
 
-from __future__ import annotations
-
 from flownav.core.compile import ONE_LANE
 from flownav.core.errors import InputError
 from flownav.logs.log import Log

@@ -3,8 +3,6 @@
 It is called as a compiled navigator is (`navigation.take.UNIT_SIGNATURE`), by the simulator's loop and by a replay's.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from typing import Any

@@ -4,8 +4,6 @@ Plain NumPy on arrays of three and four; the equations are those of `flownav.cor
 conventions.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 """A replay as a Record: estimates, measurements, innovations, events, scores and provenance; and an attitude for logs
 without one."""
 
-from __future__ import annotations
-
 import platform
 from dataclasses import replace
 from importlib.metadata import version

@@ -1,7 +1,5 @@
 """Replaying what a navigator was fed: the same rows in the same order, so that the estimates are the same bits."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,8 +1,6 @@
 """What a replay is judged by besides its errors: when the vehicle flew, innovations, coverage, sensors that do not
 serve, the autopilot's own estimate, and what a log would lack to be replayed."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace

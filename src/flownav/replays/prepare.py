@@ -4,8 +4,6 @@ Nothing here looks ahead of the instant a reading arrives, but for one decision 
 rotation out of the flow.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property

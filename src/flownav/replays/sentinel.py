@@ -8,8 +8,6 @@ velocity: as complex numbers (north + i east) their correlation has a size (do t
 Only what is beyond doubt is said: where the vehicle moves too little, or GPS is away, nothing is.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """A replay: a log through the filter, its scores, and a table of GPS outages."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor

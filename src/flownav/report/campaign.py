@@ -1,7 +1,5 @@
 """A campaign as one HTML page that needs nothing but a browser, and a certificate, which prints on A4 to be signed."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path

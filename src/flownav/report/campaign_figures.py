@@ -1,7 +1,5 @@
 """The figures of a campaign's page and of an envelope's, from what its summary says and where its flights touched."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple

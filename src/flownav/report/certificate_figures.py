@@ -1,7 +1,5 @@
 """The figures of a certificate: touchdowns, the tail of each measure, the envelope, inputs ranked, the split."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

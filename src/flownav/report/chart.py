@@ -1,8 +1,6 @@
 """Axes stacked over one time axis, as data, and which samples are drawn: a record's page draws them with uPlot, every
 other page with Plotly."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal

@@ -1,7 +1,5 @@
 """Estimators, and records, compared on one page: tables, GPS cuts, errors over each other, differences, paths."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The words and tables of the report: headline, scores, events, parameters. Scores are shown, never computed."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from pathlib import PurePath

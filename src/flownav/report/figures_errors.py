@@ -3,8 +3,6 @@
 Where nobody knows the truth, what the estimate differs from GPS by.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from flownav.core.measurement import Sensor

@@ -1,7 +1,5 @@
 """How good the filter says it is: radius of uncertainty (figure 31), normalised errors, protection levels."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from flownav.core.measurement import COLUMNS, Sensor

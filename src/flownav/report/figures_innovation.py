@@ -1,7 +1,5 @@
 """Innovations in the band that they were expected in, and states beyond position and velocity in theirs."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The path over the ground: top view and 3-D view over the pad."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 

@@ -1,7 +1,5 @@
 """Position, velocity, attitude and controls in time: the paper's figures 17 to 25."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

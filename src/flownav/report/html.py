@@ -1,7 +1,5 @@
 """Write a record's report: one HTML file that needs nothing but a browser."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

@@ -5,8 +5,6 @@ of neighbours, and of these each of the four bytes by itself: smooth series then
 compressed with gzip and written as base64; `record_data.js` turns that back with the browser's own DecompressionStream.
 """
 
-from __future__ import annotations
-
 import base64
 import gzip
 import hashlib

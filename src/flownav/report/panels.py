@@ -1,7 +1,5 @@
 """Panels and tiles of a page, and numbers as pages write them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ them where the reader's system asks for dark, so a role (truth, estimate, ...) h
 A chart becomes a Plotly figure here: each name appears once in the legend and switches all its traces.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from html import escape
 from typing import Any

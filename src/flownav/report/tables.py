@@ -1,7 +1,5 @@
 """The tables of the report: scores, phases, outages, sensors, events, parameters. Scores are shown, never computed."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from collections.abc import Iterator, Mapping, Sequence

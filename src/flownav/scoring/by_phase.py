@@ -1,7 +1,5 @@
 """What each phase of a flight was like: errors, and readings that were not fused."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """The course of a flight as its touchdown asks for it: what is remembered of its epochs, and of its first contact."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

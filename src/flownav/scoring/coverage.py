@@ -1,7 +1,5 @@
 """From when to when each sensor spoke, and which was silent while the others spoke."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

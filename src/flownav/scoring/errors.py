@@ -4,8 +4,6 @@ Histories are `(epochs, columns, lanes)`; a single flight is a block of one lane
 one order, so a flight scores the same bytes alone and in any block.
 """
 
-from __future__ import annotations
-
 import csv
 from typing import Any, NamedTuple
 

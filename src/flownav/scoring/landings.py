@@ -5,8 +5,6 @@ that crashed, never touched or never came to rest is infinitely far off. What li
 percentile of each part's length over the flights that touched.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any
 

@@ -3,8 +3,6 @@
 The same functions score a replay, its smoothed path, and whatever other estimate somebody holds against it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

@@ -6,8 +6,6 @@ batch means; Law, Simulation Modeling and Analysis, 5th edition, section 9.5.3):
 It says what this flight would show again under the same conditions, not what other flights would.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -10,8 +10,6 @@ longer neighbour, except the descent onto the ground. The descent that ends in c
 approach; from contact until rest is the touchdown, and the ground afterwards is named landed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any, NamedTuple

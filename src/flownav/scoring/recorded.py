@@ -1,7 +1,5 @@
 """The scores of a record, computed from its tables alone, of its own estimate or of another one put in its place."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

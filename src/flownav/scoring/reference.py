@@ -5,8 +5,6 @@ instant that the GPS sample describes (its time less the GPS delay), less its me
 samples of the window; rms and maximum over the window. GPS noise puts a floor under it.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ The same columns as `errors.score_block` and `touchdown.touchdowns` compute from
 epoch (`errors.with_error`, `course.followed`).
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

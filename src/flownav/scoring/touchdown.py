@@ -11,8 +11,6 @@ e_pad being e when the pad's place was last seen or noted: guidance is where the
 wrong it had the pad's place, and estimate how far it has drifted since.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

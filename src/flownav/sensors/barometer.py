@@ -11,8 +11,6 @@
 Altitudes are metres over the place of take-off, positive upwards.
 """
 
-from __future__ import annotations
-
 import math
 from typing import ClassVar, NamedTuple
 

@@ -3,8 +3,6 @@
 Of flow: what a sensor file (`datasheet.FlowSensor`: dynamics, noise, limits) does not say.
 """
 
-from __future__ import annotations
-
 import math
 from typing import ClassVar
 

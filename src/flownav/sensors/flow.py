@@ -18,8 +18,6 @@ Velocities are of the lens, body FRD [m/s]; heights are of the lens above the gr
 Last: when the sensor sees the pattern of the pad and can follow it (`engagement`).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

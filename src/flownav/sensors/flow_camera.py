@@ -21,8 +21,6 @@ height over the greatest and of the flow over the fastest, by the texture, and i
 reading.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -14,8 +14,6 @@ three waves of fixed directions and lengths, which no vehicle of a metre's size 
 beam's distance has of it is its height where the beam meets the plane.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

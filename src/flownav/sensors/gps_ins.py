@@ -10,8 +10,6 @@ parameters alone select:
 - `midg`: what 2 m CEP means (Table 4): errors of metres that change over minutes, one sample (20 ms) late.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from flownav.core.compile import equation

@@ -10,8 +10,6 @@ Positions and velocities NED; the antenna sits at a lever from the centre of gra
 of: p + R l, v + R (w x l).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from flownav.core.compile import equation

@@ -1,7 +1,5 @@
 """The datasheet of a GPS receiver, and the coefficients that follow from it."""
 
-from __future__ import annotations
-
 import math
 from typing import ClassVar
 

@@ -18,8 +18,6 @@ sensor's bandwidth. What is left beyond half the rate aliases by itself: the pha
 period, as a precomputed rotation, so that no sine is left for the flight loop.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

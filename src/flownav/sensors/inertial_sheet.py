@@ -1,7 +1,5 @@
 """The datasheet of an inertial measurement unit, and the coefficients that follow from it."""
 
-from __future__ import annotations
-
 import math
 from typing import ClassVar
 

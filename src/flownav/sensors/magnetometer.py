@@ -8,8 +8,6 @@ J. Aerospace Eng. 19(2), 2006; motor current as in ArduPilot's compass-motor cal
 has left, drawn once a flight.
 """
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from typing import ClassVar, NamedTuple

@@ -10,8 +10,6 @@ relative least squares, with a polynomial in the fourth root of the height; powe
 smooth in it: degree 8 follows the shipped law to 2e-12, every power from -1 to 3 over heights of 1 : 30 to 7e-4.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Literal, NamedTuple

@@ -31,8 +31,6 @@ between two heights and the pad's mark, whose sides lie north and east, is whole
 and so wide to the right.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

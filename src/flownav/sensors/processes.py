@@ -31,8 +31,6 @@ is the state of 1/(s^2 + b s + c): x1 the output, x2 its rate. Over one period w
 hold) the solution is linear, x[k+1] = F x[k] + G u[k], and F, G are computed once, in closed form.
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 from statistics import NormalDist

@@ -12,8 +12,6 @@
   and spells in which nothing arrives. A unit may be stuck for good.
 """
 
-from __future__ import annotations
-
 import math
 from typing import ClassVar, NamedTuple
 

@@ -7,8 +7,6 @@ the only vertical velocity that the sensor has:
     x- = x + v T,   e = range - x-,   x = x- + 0.8461 e,   v = v + 6.2034 e
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from flownav.core.compile import clamp, equation, larger

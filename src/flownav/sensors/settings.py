@@ -4,8 +4,6 @@ Units stand in the keys; every default has a source in `docs/explanation/sensors
 the coefficients that the equations use, so no exponential is left for the flight loop.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Literal
 

@@ -4,8 +4,6 @@ A datasheet is a TOML file with units in its key names. `rate_hz` is how often t
 reading is when it arrives, and `jitter_s` how unevenly it arrives: the age lies evenly within latency_s +- jitter_s.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import ClassVar, Literal, Self
 

@@ -1,7 +1,5 @@
 """The datasheets of all sensors that a vehicle carries: what simulation draws from and what the navigator is told."""
 
-from __future__ import annotations
-
 from flownav.core.parameter_files import ParameterModel
 from flownav.sensors.barometer import BarometerSheet
 from flownav.sensors.camera_sheets import FlowCameraSheet, PadCameraSheet

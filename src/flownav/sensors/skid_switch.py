@@ -5,8 +5,6 @@ reported follows once the contact has said the same for as many readings as the 
 Debouncing, 2004). A switch may be stuck open or closed for a whole flight.
 """
 
-from __future__ import annotations
-
 import math
 from typing import ClassVar, NamedTuple
 

@@ -1,7 +1,5 @@
 """From a scenario to a flight: files read, helicopter trimmed, filters and gains built, all as plain numbers."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path

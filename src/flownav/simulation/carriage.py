@@ -1,7 +1,5 @@
 """Each carried sensor on lanes, made from its row: how it is drawn, how it starts, how it is read into a slot."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from typing import Any, NamedTuple, get_type_hints

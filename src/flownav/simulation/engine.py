@@ -1,7 +1,5 @@
 """Running flights: one as a block of one lane, many as blocks of lanes on a pool of threads."""
 
-from __future__ import annotations
-
 import os
 import threading
 from collections import deque

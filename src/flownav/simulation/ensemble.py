@@ -4,8 +4,6 @@ The navigator's settings, its timetable and the autopilot's gains stay those of 
 (seed, flight) alone, so that a flight is the same by itself, in any batch and on any lane.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any

@@ -1,7 +1,5 @@
 """The parts of one epoch of the closed loop: what is flown on, the outer and the attitude loop, the plant."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ in [begins_s, ends_s); the sizes are those of `faults.catalogue`, whose injector
 the two together.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

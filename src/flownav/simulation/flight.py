@@ -5,8 +5,6 @@ batch, and both are the same bytes. Rates: physics 500 Hz (Runge-Kutta), flow dy
 250 Hz, outer loop 50 Hz; the paper's sensors and filter 50 Hz, the vehicle's own sensors by their datasheets.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

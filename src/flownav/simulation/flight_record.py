@@ -4,8 +4,6 @@ A flight on the navigator keeps what the navigator was fed, reading by reading, 
 runs the same navigator on the same readings.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The history of a block of flights: one row of columns an epoch, from which scores and records are made."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

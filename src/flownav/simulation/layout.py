@@ -4,8 +4,6 @@ One flat buffer holds every scalar as a row of lanes (see `flownav.core.compile`
 that kernels see them as compile-time numbers.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from flownav.control.autopilot import AutopilotState, Estimate

@@ -4,8 +4,6 @@ The simulator writes readings into the rows that the navigator takes them from, 
 touches the filter.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

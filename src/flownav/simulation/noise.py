@@ -5,8 +5,6 @@ the counter into 128 random bits, Box-Muller turns those into two standard norma
 carry, so a flight draws the same numbers alone, in any batch, on any thread and after a resume.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from flownav.core.compile import cosine_of_eighth, equation, float_from_bits, log_of_unit, sine_of_eighth

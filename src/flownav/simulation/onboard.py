@@ -3,8 +3,6 @@
 Last: datasheets as a scenario wants them, its own figures above the files', at rates that the simulator's clock has.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np

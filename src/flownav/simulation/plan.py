@@ -1,7 +1,5 @@
 """What a flight is: the plan, the vehicle, the sensors and the rates of the loop, as numbers that kernels take."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The plant on lanes: Runge-Kutta steps of the helicopter, of the paper's helicopter, or the paper's linear truth."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

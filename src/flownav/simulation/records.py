@@ -4,8 +4,6 @@
 `forward`, `right` and `below` (of velocities u, v, w) are body FRD.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from flownav.sensors.gps_ins import NavSolution

@@ -1,7 +1,5 @@
 """What the simulator reads of the navigator, as records of the navigator's buffer, which laws are told as `nav`."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from flownav.core.compile import Lanes, Layout, Work, equation

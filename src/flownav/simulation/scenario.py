@@ -4,8 +4,6 @@
 those of the skids relative to the pad's centre, in the local NED frame.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """What each carried sensor sees of the plant, and what is told of its readings: functions of one lane's records."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

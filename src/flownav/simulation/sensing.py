@@ -1,7 +1,5 @@
 """The sensors on lanes: each epoch's normals, and every reading taken from the plant's state."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from flownav.core.compile import Lanes, Work, equation

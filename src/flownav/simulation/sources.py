@@ -3,8 +3,6 @@
 For those who ask which noise made a flight what it was; the kernel draws its own.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What surrounds each lane's vehicle in an epoch: the wind at its height, its own wake, the ground under it."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ Each flight has a `Truth` of its own, which lies in its lane's rows of the buffe
 Its sensors' fault is part of it: what they do wrong, and when.
 """
 
-from __future__ import annotations
-
 from collections import namedtuple
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple, get_type_hints

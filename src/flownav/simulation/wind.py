@@ -27,8 +27,6 @@ with the signs of a field that is carried along the wind: w = w0 + p y - q x, v 
 The processes are sampled exactly (variance and autocorrelation) at 50 Hz. Without wind every output is +0.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

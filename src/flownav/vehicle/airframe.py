@@ -6,8 +6,6 @@ rotor turns clockwise seen from above, so its torque yaws the body to the left a
 The rigid body is the paper's equations 2-7, with the attitude as a quaternion in place of equations 8-10.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

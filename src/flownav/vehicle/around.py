@@ -3,8 +3,6 @@
 The ground near a vehicle is a plane, down = -(slope_n·n + slope_e·e), and what each foot and each rotor finds over it.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from flownav.core.compile import equation

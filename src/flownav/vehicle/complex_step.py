@@ -4,8 +4,6 @@ A real-analytic function has f(x + i·h) = f(x) + i·h·f'(x) + O(h²): with h =
 rounding, without the cancellation of differences.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

@@ -6,8 +6,6 @@ collective carries it) is moved alone, on the vehicle as told. Each corner keeps
 `uncertainty = 0.6` (either way) or `"0.012..0.025"` (from, to).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import product
 from pathlib import Path

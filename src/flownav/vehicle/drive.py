@@ -11,8 +11,6 @@ it faster, Q_main + J·Ω': without the engine nothing but the tail's drag is le
 Servos (block 1) are of second order with travel and rate limits, as seen at the blade.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -3,8 +3,6 @@
 Closed forms only (hover by momentum theory and blade elements), so that a bad file is refused at once.
 """
 
-from __future__ import annotations
-
 import math
 
 from flownav.core.errors import InputError

@@ -4,8 +4,6 @@ Straight-line scalar equations, so that lanes vectorise: 26 states in, 26 rates 
 it flies; in `derivative_in_balance`, the paper's, the rotor keeps its speed and its inflow is in balance at once.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from flownav.core.compile import equation

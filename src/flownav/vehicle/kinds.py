@@ -3,8 +3,6 @@
 A file is checked, made flat, and refused where no such vehicle could hover.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any, NamedTuple

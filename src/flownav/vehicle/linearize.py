@@ -17,8 +17,6 @@ every error: slop has no derivative.
 The attitude is a small rotation about the body axes, so that the plant has no state for a quaternion's length.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple

@@ -8,8 +8,6 @@ Paulos and Kumar 2023): thrust, drag and axial damping linear in Ω·velocity; t
 propeller's static thrust, see `MultirotorParameters`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

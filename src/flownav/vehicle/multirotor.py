@@ -4,8 +4,6 @@ Straight-line scalar equations, so that lanes vectorise: 20 states in, 20 rates 
 known when a kernel is compiled; four leave the work of the other two out.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from flownav.core.compile import equation

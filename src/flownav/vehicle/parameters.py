@@ -1,7 +1,5 @@
 """The parameters of a helicopter and of a multirotor: the flat bundle that kernels take, made of a file's numbers."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -10,8 +10,6 @@ induced velocity. The main rotor's inflow takes time (`drive`); here is where it
 Ground effect is that on the main rotor's thrust (paper equation 11, read as Cheeseman and Bennett printed it).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

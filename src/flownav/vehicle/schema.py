@@ -4,8 +4,6 @@ Angles stand in degrees in the file and become radians in `parameters.VehiclePar
 they catch a wrong unit or a slipped decimal, not a bold design.
 """
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field, field_validator

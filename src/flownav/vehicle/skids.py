@@ -11,8 +11,6 @@ law. A parked helicopter therefore stays put against its tail rotor, without the
 regularisation and without its stiffness, which a 2 ms Runge-Kutta step could not carry.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The state of a helicopter and of a multirotor, their controls and what follows from them, as bundles of scalars."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from flownav.core.compile import equation, magnitude, passing, replacing, runge_kutta, stepping

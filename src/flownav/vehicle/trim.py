@@ -4,8 +4,6 @@ Newton's method on the whole equations of motion, with the exact Jacobian of the
 finds its rotors' speeds, too.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """The cells of a requirement: each combination of the heights, sensors, vehicles and faults of its conditions."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product

@@ -1,7 +1,5 @@
 """A requirement flown, judged and written down: the certificate, with what decides the outcome in its worst cell."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """One requirement held against the flights, and the envelope: where in its conditions it is shown, field by field."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import product
 from typing import Any, NamedTuple

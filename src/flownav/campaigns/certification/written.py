@@ -1,7 +1,5 @@
 """A certificate written down: records of the worst flights, what was assumed, hashes of every file, JSON and page."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path

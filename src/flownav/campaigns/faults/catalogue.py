@@ -5,8 +5,6 @@ are not fed, as if they were lost, and that is how they are flown; doubled and d
 drops or puts in order again, are not flown at all (`flownav faults --offline` tries them).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple

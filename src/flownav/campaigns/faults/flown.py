@@ -5,8 +5,6 @@ what becomes of the vehicle: whether it landed, went around or crashed, and how 
 had been said of it.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple

@@ -9,8 +9,6 @@ value for value. Rows of a stream stand in the order of arrival, so after an inj
 time stamps `t_s` no longer increases: that is the fault.
 """
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace

@@ -3,8 +3,6 @@
 Flights are those of `faults.table`; the error is that of the estimate at its own instants, from the fault's begin on.
 """
 
-from __future__ import annotations
-
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence

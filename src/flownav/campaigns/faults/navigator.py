@@ -1,7 +1,5 @@
 """The navigator on trial, behind a horizon, told what the datasheets of the sensors state, and what it gives back."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path

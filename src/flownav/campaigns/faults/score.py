@@ -4,8 +4,6 @@ Each figure is defined in docs/explanation/faults.md. A run with the fault is co
 flight without it.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping
 from typing import NamedTuple

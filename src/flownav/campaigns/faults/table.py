@@ -1,7 +1,5 @@
 """Every fault at several heights: one flight a height, its log with and without each fault, the navigator on each."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple

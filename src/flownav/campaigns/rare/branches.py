@@ -1,7 +1,5 @@
 """Between the walk's flights, which are normals and streams, and the engine's; the likeliest as a file, and again."""
 
-from __future__ import annotations
-
 import json
 import math
 from math import ceil

@@ -1,7 +1,5 @@
 """The probability of a rare event, part by part, how well it is known, and what it most likely looks like."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple

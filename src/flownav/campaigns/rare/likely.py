@@ -5,8 +5,6 @@ about that, and how many nats the two say of it: the Kullback-Leibler divergence
 pad can be missed to the north and to the south: then the mean stays where it was and the spread grows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

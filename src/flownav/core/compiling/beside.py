@@ -5,8 +5,6 @@ unit into the cache, from where this one loads it. Whatever goes wrong there (ki
 file) costs time only: what is not in the cache afterwards is compiled here.
 """
 
-from __future__ import annotations
-
 import importlib
 import os
 import subprocess

@@ -3,8 +3,6 @@
 LLVM vectorises straight-line code only, so the functions are generated, not looped.
 """
 
-from __future__ import annotations
-
 import hashlib
 import linecache
 from collections.abc import Callable, Iterator, Sequence

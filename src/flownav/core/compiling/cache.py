@@ -9,8 +9,6 @@ What is damaged is compiled anew and replaced. A folder that cannot be written, 
 holds code that is run), is not used, which is said in one line on standard error.
 """
 
-from __future__ import annotations
-
 import hashlib
 import inspect
 import os

@@ -5,8 +5,6 @@ a change in a page, in a reader or in a remark compiles nothing. Imports inside 
 `TYPE_CHECKING` are not followed: a kernel's code cannot come from them.
 """
 
-from __future__ import annotations
-
 import ast
 import hashlib
 import json

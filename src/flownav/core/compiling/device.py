@@ -8,8 +8,6 @@ that additions, products, quotients and roots are the CPU's to the last bit, and
 are made of them (`elementary`).
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

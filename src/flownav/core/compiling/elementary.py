@@ -10,8 +10,6 @@ Polynomials for an eighth of a turn, logarithm, exponential and arc sine: Sun Mi
 e_log, e_exp, e_asin); reduction by Cody and Waite, Software Manual for the Elementary Functions, 1980.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import wraps

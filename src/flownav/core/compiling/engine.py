@@ -1,7 +1,5 @@
 """Equations, procedures and kernels: what is compiled, how, and where it is kept."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 

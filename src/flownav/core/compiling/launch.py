@@ -6,8 +6,6 @@ and hands over arguments as the code takes them, field by field (`flattened`). `
 thread at a time, where NUMBA_ENABLE_CUDASIM=1.
 """
 
-from __future__ import annotations
-
 import hashlib
 import inspect
 import math

@@ -5,8 +5,6 @@ the lifetimes of its variables anew after each pass (nine times a function). Equ
 and the lifetimes only where something is counted; a function that holds something unusual takes Numba's own way.
 """
 
-from __future__ import annotations
-
 import types as python_types
 from typing import Any, NamedTuple
 

@@ -4,8 +4,6 @@ Numba compiles `array[i]` as `array[i + n if i < 0 else i]` and takes the whole 
 access; that select stands between LLVM and its vectoriser. `pointer(array)[i]` is one address and one load.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 

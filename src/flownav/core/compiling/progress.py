@@ -1,7 +1,5 @@
 """What is being compiled, and for how long: said on standard error, at least every second on a terminal."""
 
-from __future__ import annotations
-
 import sys
 import threading
 import time

@@ -3,8 +3,6 @@
 All of this is only in force inside `remembering()`, and changes no result.
 """
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Hashable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext

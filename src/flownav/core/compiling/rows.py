@@ -4,8 +4,6 @@ A record is a NamedTuple class over one type variable: its fields are a row's nu
 Python. A field takes one number, or as many as its annotation says: `pos_ned_m: Annotated[Value, 3]`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from itertools import accumulate

@@ -3,8 +3,6 @@
 Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I, 1993, table II.1.2.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Where functions of one thread are run by many threads: what is asked of a device, or of what stands for one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, Protocol
 

@@ -1,7 +1,5 @@
 """Scalar helpers that work on floats, on complex numbers (complex step) and inside lanes; the bits of a float."""
 
-from __future__ import annotations
-
 import struct
 from typing import Any
 

@@ -5,8 +5,6 @@ this machine has. Their files say of which function and types they are: that is 
 process (`FLOWNAV_LEVEL`) into its cache (`FLOWNAV_CACHE`), so that a machine may build what it cannot run.
 """
 
-from __future__ import annotations
-
 import importlib
 import pickle
 import sys

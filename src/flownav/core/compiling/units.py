@@ -1,7 +1,5 @@
 """Units: pieces of a kernel that are compiled and cached by themselves and called through their addresses."""
 
-from __future__ import annotations
-
 import ast
 import ctypes
 import inspect

@@ -1,7 +1,5 @@
 """Attitude and heading: an INS's or autopilot's attitude, a compass, a gap of the IMU that was bridged."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

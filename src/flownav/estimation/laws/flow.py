@@ -1,7 +1,5 @@
 """Optical flow: angular rates less the vehicle's turning, metric velocities, and a sensor with its own dynamics."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from flownav.core.compile import equation

@@ -1,7 +1,5 @@
 """What the laws share: body axes in the earth frame, levers, the distance to level ground."""
 
-from __future__ import annotations
-
 from flownav.core.compile import equation, larger
 from flownav.core.frames import Rotation, Vector
 

@@ -1,7 +1,5 @@
 """GPS position and velocity, axis by axis (0 north, 1 east, 2 down), of an antenna at a lever from the IMU."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from flownav.core.frames import GRAVITY_M_S2, to_earth

@@ -1,7 +1,5 @@
 """Height: the rangefinder over ground whose level is a state, and the barometer with its offset."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from flownav.core.compile import larger

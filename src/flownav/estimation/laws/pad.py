@@ -1,7 +1,5 @@
 """A pad-relative fix: two tangents and a distance from a camera that looks down, of a pad whose place is a state."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """States read as they are: an external position, and a vehicle at rest, whose velocity and turning are 0."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from flownav.estimation.law import law

@@ -4,8 +4,6 @@ The format is written apart from the reader (`logs/dataflash/`), so that neither
 Source: ArduPilot, libraries/AP_Logger/LogStructure.h.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The flight that the sample logs are of, its log, and what writers need of one: fixes, angles, velocities, changes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple

@@ -4,8 +4,6 @@ The folder of CSV files is what `logs/csv_folder.py` reads (docs/reference/csv-f
 log is what the simulated vehicle of `live` tells, a time before each frame.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A log as PX4 would have written it: today's topics, in PX4's frames and units."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

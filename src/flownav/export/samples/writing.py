@@ -1,7 +1,5 @@
 """Sample logs written into a folder: each whole or not at all, and nothing that is there already silently replaced."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable

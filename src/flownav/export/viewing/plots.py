@@ -1,7 +1,5 @@
 """What a record says over time, in Rerun's words, and how the viewer is laid out when it opens."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ Frames: `/enu` (east, north, up: right-handed, z up, what Rerun's view is told) 
 every position stands in the file as the record has it, in NED metres, and body axes are forward-right-down.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

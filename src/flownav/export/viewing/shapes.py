@@ -4,8 +4,6 @@ What the record does not say (a replayed log knows nothing of the airframe) is d
 nothing more: no size is made up. The flow's velocity is flow less the sensor's own turning, times the range.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """A record for Rerun's viewer: as a file (.rrd) that opens on any machine, or in a window of this one."""
 
-from __future__ import annotations
-
 import os
 import sys
 import uuid

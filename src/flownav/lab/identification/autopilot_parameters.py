@@ -9,8 +9,6 @@ PX4's noise is an angular rate that runs from N_MIN at quality 255 to N_MAX at Q
 Neither knows height: the figure taken is the noise over height where it is worst, so the filter is never told less.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """What an identification found, whatever kind of log it came from: the one bundle that file, JSON and table read."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any

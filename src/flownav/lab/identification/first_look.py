@@ -3,8 +3,6 @@
 The quick part of an identification, for `flownav info`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

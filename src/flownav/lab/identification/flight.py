@@ -10,8 +10,6 @@ IMU's earth acceleration ties both to the vehicle's clock: it gives the flow's l
 shows swapped or inverted axes even where the reference's heading is unknown.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple

@@ -8,8 +8,6 @@ Latency. The age of a reading when it arrives, on the vehicle's clock: from the 
 reference, whose own delay the IMU gives; the better-known of the two.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple

@@ -11,8 +11,6 @@ its N_MIN and N_MAX), `height` (the fitted power law), `paper`. Each is fitted o
 scored on the blocks between by the mean of log sigma + e^2/(2 sigma^2): the lower, the better the filter is told.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The job: logs in, findings out; rig logs together, one joint model for each height, or one flight."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

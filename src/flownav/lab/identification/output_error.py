@@ -7,8 +7,6 @@ For white residuals this is the maximum-likelihood estimate, and its covariance 
 bound. Residuals that are not white get the sandwich with their own autocovariance in place of J'J.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

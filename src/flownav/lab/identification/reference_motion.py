@@ -6,8 +6,6 @@ width SPLIT_S) is compared: a reference or the flow against the IMU gives its de
 the angle by which a reference's north is turned. The rest comes from the reference.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 

@@ -18,8 +18,6 @@ derivatives solve the same equation driven by -x^(j); x by the initial state is 
 Inside, time is scaled by the model's own rate a_n^(1/n), which makes a_n one and M well balanced.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

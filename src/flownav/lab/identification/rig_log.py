@@ -9,8 +9,6 @@ A folder holds `rig.csv`, and `rig.toml` beside it where the geometry is to be k
   x axis (the paper's equation 14 is the horizontal part, l cos(theta) dtheta/dt, less by 0.5 % at 6 degrees).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -22,8 +22,6 @@ is slower than the reference's noise is left out, since it would read as a scale
 one stretch of CLUSTER_S at a time (jackknife): one turn or one climb that is off counts as one.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ What a log cannot tell (optics, limits, the sonar's floor) is taken over from a 
 the input did not show are those of a second-order Bessel lag with the identified gain and latency, and say so.
 """
 
-from __future__ import annotations
-
 import math
 import tomllib
 from collections.abc import Mapping

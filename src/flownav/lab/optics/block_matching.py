@@ -6,8 +6,6 @@ Frames are flat uint8 arrays, row after row; x is to the right, y down, a positi
 to the right or down from the previous frame to the current one.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

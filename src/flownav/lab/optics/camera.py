@@ -8,8 +8,6 @@ principal point (Kannala and Brandt, PAMI 28, 2006, of two terms; k1 = 1/3 and k
 Pixels are counted from the image's middle, as `projection` does; rays are tangents (x/z, y/z) in the camera frame.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

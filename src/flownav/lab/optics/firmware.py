@@ -5,8 +5,6 @@ set of plain numbers and switches, so that a defect can be switched alone:
 `firmware_named("2013-09")._replace(gyro_scale=1.0)`.
 """
 
-from __future__ import annotations
-
 from itertools import accumulate
 from typing import Any, NamedTuple
 

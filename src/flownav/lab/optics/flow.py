@@ -4,8 +4,6 @@
 frame pair, which `lab/rig/` uses too.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pictures and videos from a user's disk as grey frames, uint8; cutting and binning them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path

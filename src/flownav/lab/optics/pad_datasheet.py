@@ -1,7 +1,5 @@
 """The datasheet of a pad camera as `flownav pad --out` writes it: what was measured, and what is assumed beside it."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

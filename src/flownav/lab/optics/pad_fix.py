@@ -5,8 +5,6 @@ forward and right, and the distance from lens to centre. The image is rectilinea
 distorts has to be corrected first.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -11,8 +11,6 @@ are exposed one after the other. **Missed** are a share `hidden` of each flight'
 whatever it does (what lies on the pad, glare), and of the rest those of a probit in r and w.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -5,8 +5,6 @@ and things that lie on the pad; these last as long as the flight. Attitude, plac
 drawn anew for every frame. The detector corrects the lens by what it believes of it.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -3,8 +3,6 @@
 Camera frame: x to the right of the image, y down, z along the optical axis. Image points are tangents (x/z, y/z).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

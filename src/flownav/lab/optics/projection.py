@@ -7,8 +7,6 @@ z = -h. Pixels (x, y) are counted from the principal point; f is the focal lengt
 Times are from the middle of the exposure of the frame's middle row, which is the instant that the frame is of.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ its rays. Motion blur is the mean over two instants of the exposure (the Gauss p
 the whole. Stripes seen square on need no raster: `stripe_row` sums their harmonics.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple

@@ -3,8 +3,6 @@
 The ground is the plane of `projection`; brightness is in units of the light that falls on it, as reflectance is.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

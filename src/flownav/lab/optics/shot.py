@@ -5,8 +5,6 @@ pixel then samples it along its ray at a few instants of its row's exposure. Gro
 raster at the scale of a pixel straight below, whose contrast is let go as pixels take in more of it.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

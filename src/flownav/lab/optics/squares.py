@@ -3,8 +3,6 @@
 Image coordinates here are (column, row) [px], whole numbers at the middle of a pixel. Corners go clockwise as seen.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The camera on the rod: every frame rendered and matched against the one before, nothing kept but the flow."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

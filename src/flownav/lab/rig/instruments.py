@@ -5,8 +5,6 @@ Its rate is the slope of a local cubic through 25 ms on either side, fitted afte
 no delay of its own; a difference of neighbouring counts would carry 0.16 rad/s of quantisation.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

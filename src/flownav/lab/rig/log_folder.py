@@ -3,8 +3,6 @@
 Several runs or heights stand side by side as FOLDER/run-001, run-002, ...
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path

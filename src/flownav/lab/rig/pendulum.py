@@ -7,8 +7,6 @@ A free swing is a near-pure tone: it tells gain and latency, no more. Rods of se
 the chirp and the steps, by a motor at the pivot, give a band.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`flownav live --setup`: meet the vehicle, read, compare, write where asked to, and say what is to be done."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

@@ -3,8 +3,6 @@
 The port that we speak over is found by its baud rate.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from flownav.live.setup.knowledge import SETS, Arming, Knowledge, Wanted

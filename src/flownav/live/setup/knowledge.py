@@ -1,7 +1,5 @@
 """What flownav needs of a make's parameters: data/setup/*.toml, checked, with the sentence that says it."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from flownav.core.parameter_files import ParameterModel, load, shipped

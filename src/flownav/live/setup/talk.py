@@ -3,8 +3,6 @@
 Parameters are read and written a few at a time, asked for again, with an end.
 """
 
-from __future__ import annotations
-
 import struct
 import time
 from collections.abc import Callable

@@ -6,8 +6,6 @@ may hold several logs, one for each time the vehicle was armed. src/main/blackbo
 numbers: each function takes the bytes and a place, and gives the place after; -1 says that the bytes end before.
 """
 
-from __future__ import annotations
-
 import struct
 from dataclasses import dataclass, field
 

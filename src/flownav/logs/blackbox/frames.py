@@ -4,8 +4,6 @@ A frame counts only where another begins, or the log ends, behind it; else readi
 main frames wait for the next whole one (I). betaflight/blackbox-log-viewer, src/flightlog_parser.js does the same.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

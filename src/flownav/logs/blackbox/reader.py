@@ -11,8 +11,6 @@ left speed (flow_x - body_x) h (navigation_pos_estimator_flow.c): FRD's flow_x i
 Betaflight writes of its flow sensor (debug OPTICALFLOW) changes its meaning between versions, and is not read.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

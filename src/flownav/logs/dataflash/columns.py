@@ -1,7 +1,5 @@
 """A DataFlash file as columns: every kind of message a table, one array a field, straight from the file's bytes."""
 
-from __future__ import annotations
-
 import mmap
 from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path

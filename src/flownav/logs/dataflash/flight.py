@@ -3,8 +3,6 @@
 docs/reference/dataflash.md says which messages are read and how.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

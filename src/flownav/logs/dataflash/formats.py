@@ -6,8 +6,6 @@ bytes) it starts anew at the next header that leads on to another, and the bytes
 and their factors are ArduPilot's (libraries/AP_Logger/LogStructure.h).
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple

@@ -5,8 +5,6 @@ flow_x = w_x - v_y / r, flow_y = w_y + v_x / r, bodyX and bodyY the gyro's rates
 (a simulated flight's truth bears that out: tests/logs/test_dataflash_flight.py).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -12,8 +12,6 @@ stands still (a GPS without a fix repeats its last), a reading has no time and i
 arrival clock that jumps or stands still does no harm while stamps advance.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 

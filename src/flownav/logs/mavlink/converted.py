@@ -1,7 +1,5 @@
 """What a message yields: measurements, and what was dropped and why. Absurd values never pass."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from typing import NamedTuple

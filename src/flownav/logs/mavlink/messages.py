@@ -5,8 +5,6 @@ what an autopilot's estimator or a simulator says: LOCAL_POSITION_NED, GLOBAL_PO
 HIL_STATE_QUATERNION, which are a simulator's truth. They are compared with, never fused.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from typing import NamedTuple

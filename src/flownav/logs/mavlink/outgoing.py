@@ -5,8 +5,6 @@ NED, FRD, SI, radians, Hamilton quaternions; the messages' units and frames are 
 rounded to the message's resolution; values beyond a field's range are held at its limit.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -5,8 +5,6 @@ services/parameter, "Parameter encoding": C-cast and bytewise). PARAM_VALUE says
 is 7e-45, and a 5.0 written to PX4 becomes 1084227584.
 """
 
-from __future__ import annotations
-
 import struct
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """GPS_RAW_INT, ODOMETRY, VISION_POSITION_ESTIMATE, LANDING_TARGET, EXTENDED_SYS_STATE: where the vehicle is."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 

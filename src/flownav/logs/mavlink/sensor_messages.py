@@ -3,8 +3,6 @@
 Flow is in PX4's sensor convention, which is MAVLink's: a right-hand turn about an axis is positive flow about it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

@@ -6,8 +6,6 @@ played again. pymavlink signs; what arrives is verified here, since pymavlink re
 has checked the signature, so that one forged packet would silence the true sender.
 """
 
-from __future__ import annotations
-
 import binascii
 import hashlib
 import hmac

@@ -4,8 +4,6 @@ rosbag2_storage_sqlite3 has the tables of a .db3: https://github.com/ros2/rosbag
 The library rosbags reads a .bag, and makes objects of bytes from the definitions that the bag itself holds.
 """
 
-from __future__ import annotations
-
 import sqlite3
 from collections import Counter
 from collections.abc import Callable, Iterator

@@ -4,8 +4,6 @@ So an MCAP file that was cut off, or has no index, is read as far as it goes (ht
 ends the reading, sizes are held to limits before anything is unpacked.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator
 from mmap import ACCESS_READ, mmap

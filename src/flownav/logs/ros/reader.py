@@ -5,8 +5,6 @@ same converters make streams of them. A topic's name is that of uORB behind /fmu
 version that PX4 1.16 appends (_v1).
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from pathlib import Path

@@ -5,8 +5,6 @@ REP 103 and REP 145. `mavros_msgs/OpticalFlowRad` is in base_link (FLU): mavros 
 (mavros_extras/src/plugins/px4flow.cpp, `transform_frame_aircraft_baselink`).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from flownav.core.measurement import Array, Sensor, Stream

@@ -4,8 +4,6 @@ Position and velocity follow the IMU in the short run and GPS, flow and range in
 constant. It states no uncertainty and tests no reading.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from flownav.core.measurement import Sensor

@@ -3,8 +3,6 @@
 Attitude by gyro, leaning on the specific force and on the compass; velocity on GPS or flow; position on GPS and range.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -3,8 +3,6 @@
 The attitude is a complementary filter's (`AttitudeFollower`); FilterPy has the covariance and the corrections.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -3,8 +3,6 @@
 It hovers and follows a path in calm air; with a steady wind it stands off, as a controller without integrators does.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from flownav.control.gains import AutopilotGains

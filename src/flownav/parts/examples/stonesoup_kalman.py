@@ -4,8 +4,6 @@ Position and velocity NED in one of Stone Soup's `GaussianState`s; its transitio
 attitude imply as a control. The attitude is a complementary filter's (`AttitudeFollower`).
 """
 
-from __future__ import annotations
-
 from datetime import datetime, timedelta
 from types import SimpleNamespace
 from typing import Any

@@ -1,7 +1,5 @@
 """What a campaign costs beside its flights: the store, going on, a cluster on one node, memory."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

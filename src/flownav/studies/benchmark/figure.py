@@ -1,7 +1,5 @@
 """One figure of `flownav bench`, and wall time of work."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass

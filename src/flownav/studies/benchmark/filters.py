@@ -1,7 +1,5 @@
 """Steps of the filters and their parts, each in a bare loop, for timing."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from flownav.core.compile import Lanes, Work, kernel, pointer

@@ -1,7 +1,5 @@
 """The measurements behind `flownav bench`, each a function that times real work and says what it asked for."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

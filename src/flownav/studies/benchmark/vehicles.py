@@ -1,7 +1,5 @@
 """What a block of flights spends on its plant, on the navigator and on the rest, of each kind of vehicle; replays."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable

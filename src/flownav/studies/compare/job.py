@@ -1,7 +1,5 @@
 """Comparing: a log's estimators side by side, one row each, in JSON, words and Markdown; the league of many logs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Records beside each other: the errors of each, and how much each differs from the first one, with an interval."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

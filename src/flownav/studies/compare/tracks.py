@@ -3,8 +3,6 @@
 No filter, no model of an error, nothing learnt. Whoever does worse has thrown information away.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

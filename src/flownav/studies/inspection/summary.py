@@ -1,7 +1,5 @@
 """A log in figures: its streams, its clock, its limits, what its sensors say of each other, what it lacks."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Tuning: from logs to a proposal, whether it is to be accepted, and the settings file that it becomes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path

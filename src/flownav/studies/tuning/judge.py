@@ -1,7 +1,5 @@
 """The verdict: do the proposed settings help on windows that the fit never saw? The bootstrap says how surely."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -3,8 +3,6 @@
 Between two windows lies a gap, so that what lasts of an error in one is not found again in the next.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple

@@ -4,8 +4,6 @@ Both are in nats, so that they may be added: a reading predicted with errors sma
 worth ln f more, and an error of the path that is smaller by f counts the same ln f.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """The best factors on the fit windows, one knob after the other, and how sure each of them is."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The recorded flights that are flown again, and the sensors of one simulated flight, drawn for it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from functools import lru_cache

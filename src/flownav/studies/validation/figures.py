@@ -1,7 +1,5 @@
 """The figures by which a simulated flight is held against a recorded one, each taken from a replay in the same way."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The simulator's acceptance test: recorded flights flown again with simulated sensors, figure beside figure."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """docs/explanation/validation.md: what the figures say of the simulator, in words and as a page without a date."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from flownav.core.version import __version__

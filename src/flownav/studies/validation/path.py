@@ -11,8 +11,6 @@ follows by kinematics:
 NED earth, ground at D = 0; body FRD; time is the log's.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

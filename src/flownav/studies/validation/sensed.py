@@ -4,8 +4,6 @@ A reading that the log holds at t is taken on the path at t less the sensor's la
 equations are those that the simulator flies (`flownav.sensors`), called reading by reading.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

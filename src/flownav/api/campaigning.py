@@ -98,7 +98,7 @@ def campaign(
 
 
 def _fly_for_now(plan: Plan, engine: Engine, records: int, watch: Watch | None) -> Campaign:
-    """The same in a folder that goes when nobody holds the result any more."""
+    """Fly into a folder that goes when nobody holds the result any more."""
     folder = Path(mkdtemp(prefix="flownav-campaign-"))
     try:
         found = fly_plan(plan, engine, folder, records=records, watch=watch, page=False)

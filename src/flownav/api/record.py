@@ -28,7 +28,7 @@ class Record(ground.Record):
 
     @classmethod
     def of(cls, record: ground.Record) -> Record:
-        """The same record with what this class offers; of one that has it, the same.
+        """This class's view of a record; one that is of it already is given back.
 
         Example:
             >>> kept = flownav.fly("landing", flight={"duration_s": 6.0})

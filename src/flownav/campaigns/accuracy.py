@@ -85,7 +85,7 @@ class Case:
     ablations: dict[str, dict[str, Any]]
 
     def as_json(self) -> dict[str, Any]:
-        """All of it."""
+        """Everything, as JSON has it."""
         targets = [t._asdict() | {"value": finite_or_none(t.value), "kept": t.kept} for t in self.targets]
         own = {"case": self.name, "vehicle": self.vehicle, "known_exactly": self.known, "flights": self.flights}
         both = {"matched": self.matched, "ensemble": self.ensemble}

@@ -233,7 +233,7 @@ def largest_horizontal_m(flight: Flight, history: Array) -> Array:
 
 # -- over the wind -----------------------------------------------------------------------------------------------
 def directions_deg(count: int) -> list[float]:
-    """So many directions, even over the circle, from north on."""
+    """Directions, so many, even over the circle, from north on."""
     return [360.0 * k / count for k in range(count)]
 
 

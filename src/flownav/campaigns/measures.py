@@ -172,7 +172,7 @@ class Interval(NamedTuple):
         return self.high - self.low if np.isfinite([self.low, self.high]).all() else np.inf
 
     def finite(self) -> dict[str, float | None]:
-        """As JSON has it; what is infinite is null."""
+        """A value as JSON has it; what is infinite is null."""
         return {"value": finite_or_none(self.value), "low": finite_or_none(self.low), "high": finite_or_none(self.high)}
 
 

@@ -135,7 +135,7 @@ class Recording(Protocol):
     def __call__(
         self, setup: Setup, seed: int, index: int, ensemble: Ensemble | None, fault: SensorFault | None, /
     ) -> Record:
-        """As `campaigns.local.fly_recorded`."""
+        """Fly one flight, as `campaigns.local.fly_recorded` does."""
 
 
 def record_again(plan: Plan, cell: int, flight: int, recording: Recording = fly_recorded) -> Record:

@@ -162,7 +162,7 @@ class Dataset:
         return np.column_stack([column(table, name) for name in ROW_COLUMNS])
 
     def scores(self, cell: int) -> Array:
-        """The same as (flights, len(SCORE_COLUMNS))."""
+        """Scores of the flights, (flights, len(SCORE_COLUMNS))."""
         return self.rows(cell)[:, : len(SCORE_COLUMNS)]
 
 

@@ -103,7 +103,7 @@ def _accuracy(made: list[Case], truth_model: str) -> str:
 
 
 def _touchdowns(made: list[Case], truth_model: str) -> str:
-    """Of the cases that land."""
+    """Touchdowns of the cases that land."""
     ends = ("R95 at contact [m] (95 % interval)", "R95 at rest [m] (95 % interval)")
     parts = ("estimate, p95 [m]", "guidance, p95 [m]", "pad, p95 [m]")
     rows = []

@@ -49,7 +49,7 @@ def watching(plan: Plan) -> Iterator[Callable[[CampaignProgress], None]]:
         """Flights a second."""
 
         def render(self, task: Any) -> Text:
-            """Of the last half minute."""
+            """Flights a second over the last half minute."""
             return Text(f"{task.speed:.0f}/s" if task.speed else "")
 
     columns = (

@@ -134,7 +134,7 @@ def _show_records(rows: list[dict[str, Any]], written: dict[str, str]) -> None:
 
 
 def _show(rows: list[dict[str, Any]], written: dict[str, str]) -> None:
-    """The same figures for people: a log's name, then its estimators."""
+    """Print the figures for people: a log's name, then its estimators."""
     from flownav.studies.compare.job import cells
 
     shown, log = _table(SHORT, TITLE), ""
@@ -237,7 +237,7 @@ def _log_facts(log: OfLog) -> dict[str, Any]:
 
 
 def _show_tuned(tuned: Tuned, facts: dict[str, Any]) -> None:
-    """The same figures for people."""
+    """Print the figures for people."""
     from flownav.studies.tuning.job import gain_words
 
     if tuned.proposed:

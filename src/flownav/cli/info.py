@@ -36,7 +36,7 @@ def command(
 
 
 def _print(facts: dict[str, Any]) -> None:
-    """The same figures for people."""
+    """Print the figures for people."""
     from rich.padding import Padding
 
     def padded(text: str) -> Padding:

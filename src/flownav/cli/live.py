@@ -247,7 +247,7 @@ def _facts(session: Session, latency: Latency, duration_s: float) -> dict[str, A
 
 
 def _show(facts: dict[str, Any]) -> None:
-    """The same figures for people."""
+    """Print the figures for people."""
     from flownav.live.answers import WITHHELD
     from flownav.live.screen import in_words
 

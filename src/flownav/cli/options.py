@@ -141,7 +141,7 @@ def installed_filters() -> Sequence[str]:
 
 
 def _name_of(parameter: typer.CallbackParam) -> str:
-    """As it is typed: an option's first name, or an argument's."""
+    """A parameter's name as it is typed: an option's first name, or an argument's."""
     return str(parameter.opts[0] if parameter.param_type_name == "option" else parameter.metavar)
 
 

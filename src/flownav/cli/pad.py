@@ -173,7 +173,7 @@ def _measured(
 
 
 def _plain(facts: dict[str, Any]) -> dict[str, Any]:
-    """As JSON has it: NaN is null, laws are objects."""
+    """A value as JSON has it: NaN is null, laws are objects."""
     laws = facts["laws"]._asdict()
     laws |= {name: laws[name]._asdict() for name in ("angle", "distance", "missed")}
     return facts | {"laws": laws, "cells": finite(facts["cells"])}

@@ -98,7 +98,7 @@ def numbers(option: str, text: str, separator: str, count: int, form: str) -> tu
 
 
 def show(record: Record, scores: dict[str, Any]) -> None:
-    """The same figures for people."""
+    """Print the figures for people."""
     say(f"{record.manifest['log']}: {scores['duration_s']:.1f} s")
     if scores["outages"]:
         say(table_of(OUTAGE_COLUMNS, scores["outages"], title="Horizontal error through GPS outages"))

@@ -157,7 +157,7 @@ def _facts_written(written: list[Written]) -> list[dict[str, Any]]:
 
 
 def _quiet(written: Written) -> None:
-    """Nothing is said beside the JSON object."""
+    """A listener who says nothing beside the JSON object."""
 
 
 def _show_written(written: Written) -> None:

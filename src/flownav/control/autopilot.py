@@ -63,7 +63,7 @@ class Estimate(NamedTuple):
 
 @equation
 def at_rest(gains: AutopilotGains, collective_command: float, flying: float) -> AutopilotState:
-    """Nothing integrated yet, the tilt of trimmed hover."""
+    """The state at rest: nothing integrated yet, the tilt of trimmed hover."""
     return AutopilotState(
         0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
         gains.pitch_trim_sine, gains.roll_trim_sine, collective_command, flying, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,

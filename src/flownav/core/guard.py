@@ -238,7 +238,7 @@ def _special(info: os.stat_result) -> str:
 
 
 def _unfollowed(path: Path) -> os.stat_result:
-    """Of a link the link itself; `absent/../x` is x, as it will be once the folder is made."""
+    """A path, the links of its folders followed; `absent/../x` is x, as it will be once the folder is made."""
     return os.lstat(os.path.join(os.path.realpath(path.parent), path.name))
 
 

@@ -94,7 +94,7 @@ class TcpLink(ByteLink):
         return connection
 
     def fileno(self) -> int:
-        """Of the connection, or of the server that waits for one."""
+        """The file number of the connection, or of the server that waits for one."""
         found = self._connection or self._server
         return found.fileno() if found else -1
 
@@ -197,7 +197,7 @@ class SerialLink(ByteLink):
         return serial.Serial(self._address.host, self._address.number, timeout=0, write_timeout=0)
 
     def fileno(self) -> int:
-        """Of the port."""
+        """The port's file number."""
         return int(self._port.fileno()) if self._port is not None else -1
 
     def read(self) -> list[Piece]:

@@ -100,7 +100,7 @@ class NoDisplay:
     stuck = False
 
     def show(self, now_s: float) -> None:
-        """Nothing."""
+        """Show nothing."""
 
 
 @contextmanager

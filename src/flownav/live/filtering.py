@@ -161,7 +161,7 @@ class Filtering:
         return self.running is not None and not self.running.told.equipment.use_imu
 
     def imu_rate_hz(self, t_s: float) -> float:
-        """Of the IMU's readings in the two seconds before an instant."""
+        """Rate of the IMU's readings in the two seconds before an instant."""
         return 0.5 * sum(row[0] > t_s - 2.0 for row in self._imu)
 
     # -- what a reading becomes -------------------------------------------------------------------------------

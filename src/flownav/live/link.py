@@ -160,7 +160,7 @@ class UdpLink(Link):
         self.port = int(self._socket.getsockname()[1])
 
     def fileno(self) -> int:
-        """Of the socket."""
+        """The socket's file number."""
         return self._socket.fileno()
 
     def believe(self, sender: Sender) -> None:

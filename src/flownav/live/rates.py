@@ -162,7 +162,7 @@ class Rates:
         return 1.0 / self.plan.estimate_hz
 
     def heard(self, size: int, now_s: float, *, settled: bool = True) -> bool:
-        """So many bytes arrived. True where the line has been overfull: the streams are to be asked for anew, lower.
+        """Note bytes that arrived. True where the line has been overfull: the streams are to be asked for anew, lower.
 
         settled: the vehicle has been asked for all that is planned; before, what arrives says nothing of the plan.
         """

@@ -41,7 +41,7 @@ class Finished(NamedTuple):
     reason: str
 
     def facts(self) -> dict[str, Any]:
-        """As `--json` says it."""
+        """What `--json` says of it."""
         return {
             "record": str(self.record) if self.record else None,
             "journal": str(self.journal) if self.journal else None,

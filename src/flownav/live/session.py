@@ -68,7 +68,7 @@ class Session:
 
     @property
     def origin_deg_m(self) -> tuple[float, float, float] | None:
-        """Of the navigator's frame."""
+        """Origin of the navigator's frame."""
         return self.hearing.origin.navigator_deg_m
 
     @property

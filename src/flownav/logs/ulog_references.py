@@ -152,6 +152,6 @@ def _heading(quaternion: Array) -> NDArray[np.float64]:
 
 
 def _with_heading(quaternion: Array, heading: Array) -> Array:
-    """The same tilt with another heading, where that is known: a turn about the vertical from the left."""
+    """Attitudes of the same tilt with another heading, where that is known: a turn about the vertical from the left."""
     turn_rad = np.where(np.isfinite(heading), heading - _heading(quaternion), 0.0)
     return np.column_stack(turned_about_down(tuple(quaternion.T), turn_rad))

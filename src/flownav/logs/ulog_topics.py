@@ -30,7 +30,7 @@ class Topic(Rows):
 
     @property
     def label(self) -> str:
-        """As PX4's tools write it."""
+        """The topic's name as PX4's tools write it."""
         return f"{self.name}[{self.instance}]"
 
     def has(self, *names: str) -> bool:
@@ -42,7 +42,7 @@ class Topic(Rows):
         return [self.column(f"{name}[{k}]") for k in range(count)]
 
     def vector(self, name: str, count: int) -> Array:
-        """The same side by side (n, count)."""
+        """Fields side by side, (n, count)."""
         return np.column_stack(self.parts(name, count))
 
     @property
@@ -90,7 +90,7 @@ class Topics:
         return [topic for name in names for topic in self.found if topic.name == name and len(topic)]
 
     def fullest(self, *names: str, needs: Iterable[str] = ()) -> Topic | None:
-        """Of the first named topic that is there with the fields `needs`, the instance with most rows."""
+        """The instance with most rows of the first named topic that is there with the fields `needs`."""
         fields = tuple(needs)
         for name in names:
             usable = [topic for topic in self.of(name) if topic.has(*fields)]

@@ -45,7 +45,7 @@ class Finding(NamedTuple):
         return "agrees" if self.agrees else "differs"
 
     def as_json(self) -> dict[str, object]:
-        """As the command prints it."""
+        """What the command prints."""
         said = {"topic": self.topic, "paper": self.paper, "here": self.here, "agrees": self.agrees}
         return said | {"circular": self.circular}
 

@@ -188,7 +188,7 @@ def _as_identified(logs: Iterable[RigLog]) -> dict[float, Identified]:
 
 
 def identified(run: Run) -> Identified:
-    """Of a run's second-order model."""
+    """Gain, delay and fit of a run's second-order model."""
     return Identified(run.fits[2].fit_percent, run.fits[2].point.gain, delay_s(run))
 
 

@@ -89,7 +89,7 @@ def selected_model() -> IdentifiedModel:
 
 
 def inconsistencies() -> list[Inconsistency]:
-    """All of them, in the paper's order."""
+    """Every inconsistency, in the paper's order."""
     rows = _rows("paper_inconsistencies.csv")
     return [Inconsistency(int(row["number"]), row["where"], row["printed"], row["reading"]) for row in rows]
 

@@ -206,7 +206,7 @@ def kept_together(text: str) -> str:
 
 
 def leak_sentences(laboratory: Laboratory | None) -> str:
-    """Of the table that `rows.instrument_rows` has; empty where it has none."""
+    """Sentences on the table that `rows.instrument_rows` has; empty where it has none."""
     if laboratory is None or not laboratory.instruments:
         return ""
     found = {other.name: by_height for other, by_height in laboratory.instruments}

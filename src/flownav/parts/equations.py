@@ -152,7 +152,7 @@ class EquationFilter:
 
     # -- the slow path: `protocols.Filter` on the same equations
     def start(self, told: Told) -> None:
-        """Nothing is known yet."""
+        """Begin: nothing is known yet."""
         self._now = self.memory
 
     def predict(self, t_s: float, imu: Imu | None) -> None:
@@ -171,7 +171,7 @@ class EquationFilter:
         return []
 
     def estimate(self) -> Estimate | None:
-        """As `say` has it."""
+        """The estimate, as `say` has it."""
         said = self.say(self._now)
         if not said.known:
             return None

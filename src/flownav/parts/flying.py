@@ -58,7 +58,7 @@ def fresh(part: One | type[One] | Callable[[], One]) -> One:
 
 
 def fresh_parts(parts: Parts) -> Parts:
-    """All of them."""
+    """Every part, made anew."""
     return Parts(
         parts.filter and fresh(parts.filter), tuple(map(fresh, parts.sensors)), parts.vehicle and fresh(parts.vehicle),
         parts.controller and fresh(parts.controller),
@@ -117,7 +117,7 @@ def fly_parts(
     setup: Setup, parts: Parts, seed: int, index: int, ensemble: Ensemble | None = None,
     fault: SensorFault | None = None, *, written: bool,
 ) -> Flown:  # fmt: skip
-    """The same, not yet scored; written: with the navigator's tape and what it was fed."""
+    """Flights of own parts, not yet scored; written: with the navigator's tape and what it was fed."""
     flight = setup.flight if fault is None else setup.flight._replace(fails=True)
     fitted, table = setup.fitted, flight.table
     if fitted is None or table is None:
@@ -205,7 +205,7 @@ def identities(parts: Parts) -> tuple[str, ...]:
 
 
 def _digest(part: Any) -> str:
-    """Of everything that a part is made of, as far as Python shows it."""
+    """Digest of everything that a part is made of, as far as Python shows it."""
     digest = hashlib.sha256()
     made_of = [part if isinstance(part, type) or inspect.isfunction(part) else type(part)]
     if not isinstance(part, type) and not inspect.isfunction(part):

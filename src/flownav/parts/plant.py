@@ -179,7 +179,7 @@ class OwnReadings:
 
     @property
     def address(self) -> int:
-        """Of the C function that takes readings."""
+        """Address of the C function that takes readings."""
         return self.called.address
 
     def _take(self, *arguments: float) -> None:

@@ -41,7 +41,7 @@ class Taker:
 
     @property
     def address(self) -> int:
-        """Of the C function that takes readings."""
+        """Address of the C function that takes readings."""
         return self.called.address
 
     def _called(self, *arguments: float) -> None:

@@ -66,7 +66,7 @@ class Prepared:
         return merge(self.streams.values())
 
     def parts(self) -> Iterator[EventQueue]:
-        """The same in parts, which are not kept where there are many."""
+        """The queue in parts, which are not kept where there are many."""
         if sum(map(len, self.streams.values())) <= KEPT_QUEUE:
             yield self.queue
         else:

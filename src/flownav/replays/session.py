@@ -159,7 +159,7 @@ class Replay:
         return scored.path_scores(self.table, self.references)
 
     def smoothed_scores(self) -> dict[str, Any] | None:
-        """The same of the smoothed path; None without one."""
+        """Scores of the smoothed path; None without one."""
         return None if self.smoothed is None else scored.path_scores(estimate_table(self.smoothed), self.references)
 
 
@@ -198,7 +198,7 @@ def replay(
 
 
 def replay_again(flown: Replay, options: ReplayOptions, settings: NavigatorSettingsFile) -> Replay:
-    """The same streams, prepared once, with other GPS and flow cuts and settings; other options stay as they were.
+    """Replay the same streams, prepared once, with other GPS and flow cuts and settings; other options stay.
 
     InputError where the filter never starts.
     """

@@ -95,7 +95,7 @@ def sentence(cell: dict[str, Any]) -> str:
 
 
 def headings(summary: dict[str, Any]) -> list[str]:
-    """Of the table of cells."""
+    """Headings of the table of cells."""
     return ["cell", "flights", *(FIGURES[name] for name in columns(summary)), "landed (%)", "crashed", "went around"]
 
 

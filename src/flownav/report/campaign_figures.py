@@ -126,7 +126,7 @@ def convergence(cells: Sequence[dict[str, Any]]) -> Panel | None:
 
 
 def swept_envelopes(cells: Sequence[dict[str, Any]]) -> list[Panel | None]:
-    """The same of a campaign that sweeps the wind's speed and direction: a ring a speed, a sector a direction.
+    """Envelopes of a campaign that sweeps the wind's speed and direction: a ring a speed, a sector a direction.
 
     One for each scenario and truth model.
     """

@@ -168,7 +168,7 @@ def lacking(record: Record) -> list[str]:
 
 
 def landing_sentences(landing: Mapping[str, Any]) -> list[str]:
-    """Of `scores.touchdown` as one flight has it; empty where it touched nothing."""
+    """Sentences on `scores.touchdown` as one flight has it; empty where it touched nothing."""
     contact, rest, limited = (mapping(landing.get(name)) for name in ("contact", "rest", "limited_by"))
     said = []
     if contact:
@@ -201,7 +201,7 @@ def parts_of(limited: Mapping[str, Any]) -> tuple[Part, ...]:
 
 
 def landing_tiles(landing: Mapping[str, Any]) -> list[Tile]:
-    """The same as headline figures."""
+    """The landing as headline figures."""
     contact, rest, limited = (mapping(landing.get(name)) for name in ("contact", "rest", "limited_by"))
     found = []
     if contact:

@@ -260,6 +260,6 @@ def outages(record: Record) -> list[Window]:
 
 
 def worst_outage(record: Record) -> Window | None:
-    """Of the windows without GPS in this record, the one with the largest rms drift."""
+    """The window without GPS in this record that has the largest rms drift."""
     drift = {(float(outage["t0"]), float(outage["t1"])): rms_m(outage) for outage in scored_outages(record)}
     return max(outages(record), key=lambda window: drift.get(window, 0.0), default=None)

@@ -76,7 +76,7 @@ def errors_of(record: Record, columns: tuple[str, ...]) -> tuple[Array, Array] |
 
 
 def _against_gps(record: Record, columns: tuple[str, ...]) -> tuple[Array, Array] | None:
-    """The same against GPS, at the instants that it describes: its arrival less its delay."""
+    """Errors against GPS, at the instants that it describes: its arrival less its delay."""
     gps, estimate = record.tables.get("gps_position", {}), record.tables.get("estimate", {})
     if not all(len(table.get("t_s", ())) and all(c in table for c in columns) for table in (gps, estimate)):
         return None

@@ -42,11 +42,11 @@ class ErrorSums:
         return ErrorSums(self.squares + other.squares, self.steps + other.steps)
 
     def root_mean_square(self) -> Array:
-        """Of each state over all steps, (6,); NaN without a step."""
+        """Root mean square of each state over all steps, (6,); NaN without a step."""
         return _root(self.squares.sum(axis=0), self.steps.sum())
 
     def root_mean_square_by_height(self) -> Array:
-        """Of each state in each height band, (bands, 6); NaN where no step was in the band."""
+        """Root mean square of each state in each height band, (bands, 6); NaN where no step was in the band."""
         return _root(self.squares, self.steps[:, None])
 
 
@@ -99,8 +99,8 @@ def consistency_of_block(error: Array, sigma: Array, nees: Array, height_m: Arra
 
 # -- one flight, by its innovations -----------------------------------------------------------------------
 class InnovationConsistency(NamedTuple):
-    """Of one sensor in one flight: the mean normalised innovation squared of its tested components (1 where the filter
-    states its errors rightly), how many were tested, and whether each one is news, unlike the one before."""
+    """Consistency of a sensor in a flight: the mean normalised innovation squared of its tested components (1 where
+    the filter states its errors rightly), how many were tested, and whether each one is news, unlike the one before."""
 
     nis_per_dof: float
     samples: int
@@ -108,7 +108,7 @@ class InnovationConsistency(NamedTuple):
 
 
 def consistency_of(component: Array, innovation: Array, variance: Array) -> InnovationConsistency | None:
-    """Of one sensor's tested components in order of time, (n,) each; None where none was tested.
+    """Consistency of one sensor's tested components in order of time, (n,) each; None where none was tested.
 
     component: which of the sensor's values; each is held against the one before of its own kind. variance: of the
     innovation, in its unit squared.
@@ -199,7 +199,7 @@ def over_stated(sums: ConsistencySums) -> dict[str, float]:
 
 
 def efficiency_by_height(errors: ErrorSums, bound: ErrorSums) -> dict[str, dict[str, float]]:
-    """The same in each height band, keyed "0.3-1 m", that holds LEAST_SHARE of the steps of both."""
+    """The efficiency in each height band, keyed "0.3-1 m", that holds LEAST_SHARE of the steps of both."""
     ratios = errors.root_mean_square_by_height() / bound.root_mean_square_by_height()
     share = np.minimum(errors.steps / errors.steps.sum(), bound.steps / bound.steps.sum())
     return {

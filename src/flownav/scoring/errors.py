@@ -31,7 +31,7 @@ MAX_POSITION_ERROR = len(STATES) * len(STATISTICS)
 
 
 class ErrorSums(NamedTuple):
-    """Of one state: sum, sum of squares, largest magnitude, running mean and sum of squares about it."""
+    """Sums of one state's error: sum, sum of squares, largest magnitude, running mean and sum of squares about it."""
 
     total: float
     squares: float

@@ -72,7 +72,7 @@ class Difference(NamedTuple):
 
 
 def mean_difference(t_s: Array, first: Array, second: Array, confidence: float = CONFIDENCE) -> Difference | None:
-    """Of two series (n,) at the same instants; None where they share no instant at which both are numbers."""
+    """Mean difference of two series (n,) at the same instants; None where at no instant both are numbers."""
     apart = np.asarray(second, float) - np.asarray(first, float)
     known = np.isfinite(apart) & np.isfinite(t_s)
     t_s, apart = np.asarray(t_s, float)[known], apart[known]

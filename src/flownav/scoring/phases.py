@@ -61,7 +61,7 @@ def phases_of(record: Record) -> list[Phase]:
 
 
 def motion_of(path: Array) -> NDArray[np.int64]:
-    """Of a path NED (n, 3) at every GRID_S, the motion of each instant as a place in NAMES: climb, hover, transit,
+    """The motion of each instant of a path NED (n, 3) at every GRID_S, as a place in NAMES: climb, hover, transit,
     descent."""
     half = max(1, round(0.5 * WINDOW_S / GRID_S))
     ahead = np.minimum(np.arange(len(path)) + half, len(path) - 1)

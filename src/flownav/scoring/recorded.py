@@ -48,7 +48,7 @@ def scores_of_record(record: Record) -> dict[str, Any]:
 
 
 def scores_of_other(record: Record, estimate: Estimate) -> dict[str, Any]:
-    """The same of another estimate (columns as record.TABLES["estimate"], t_s and the position at least).
+    """Scores of another estimate (columns as record.TABLES["estimate"], t_s and the position at least).
 
     What an estimate lacks is null. Of a replay what describes the log stays; what our filter made of it goes.
     """

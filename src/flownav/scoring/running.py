@@ -88,7 +88,7 @@ RUNNING_ROWS = TOUCH + len(Touch._fields)
 
 @equation
 def begin_scores(work: Rows, lanes: Lanes, row: int) -> None:
-    """Nothing seen yet, in the RUNNING_ROWS rows from `row` on."""
+    """Write that nothing is seen yet into the RUNNING_ROWS rows from `row` on."""
     for i in range(RUNNING_ROWS):
         for lane in range(len(lanes)):
             work[(row + i) * len(lanes) + lane] = 0.0

@@ -166,12 +166,12 @@ class PadCameraSheet(SensorSheet):
 
     @property
     def angle_sigma_mrad(self) -> float:
-        """Of each angle in a hover at 1 m."""
+        """Standard deviation of each angle in a hover at 1 m."""
         return math.hypot(self.angle.floor_mrad, self.angle.per_m_mrad)
 
     @property
     def distance_sigma_percent(self) -> float:
-        """Of the distance in a hover at 1 m."""
+        """Standard deviation of the distance in a hover at 1 m."""
         return math.hypot(self.distance.floor_percent, self.distance.per_m_percent)
 
     def parameters(self) -> PadCameraParameters:

@@ -58,7 +58,7 @@ class GpsReceiverSheet(SensorSheet):
 
     @property
     def vertical_sigma_m(self) -> float:
-        """The same of the vertical."""
+        """Standard deviation of the vertical position."""
         e = self.position
         return math.hypot(e.slow_sigma_down_m, e.fast_sigma_down_m, e.white_sigma_down_m)
 

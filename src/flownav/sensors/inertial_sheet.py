@@ -24,7 +24,7 @@ class GyroSheet(ParameterModel):
 
 
 class AccelerometerSheet(ParameterModel):
-    """As the gyro's; densities and biases in parts of standard gravity."""
+    """An accelerometer, with the gyro's keys; densities and biases in parts of standard gravity."""
 
     density_ug_rthz: Number = Field(ge=0.0, le=1e5)  # white noise, one-sided density
     bias_mg: Number = Field(ge=0.0, le=1000.0)  # at the start of a flight, standard deviation

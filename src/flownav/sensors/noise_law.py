@@ -49,7 +49,7 @@ def accuracy_law(accuracy: float, reference_height_m: float, signal_sigma_m_s: f
 
 
 def constant_noise(sigma_m_s: float, low_m: float, high_m: float) -> NoiseFit:
-    """The same standard deviation, which may be zero, at every height."""
+    """A law with one standard deviation, which may be zero, at every height."""
     return NoiseFit(low_m, high_m, 0.0, 0.0, (sigma_m_s, *(0.0,) * NOISE_DEGREE), 0.0)
 
 

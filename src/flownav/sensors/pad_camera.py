@@ -189,13 +189,13 @@ def noise_of(floor: float, per_m: float, per_rad_s: float, reach_m: float, image
 
 @equation
 def angle_noise(p: PadCameraParameters, reach_m: float, image_rate_rad_s: float) -> float:
-    """Of each angle [rad]."""
+    """Standard deviation of each angle [rad]."""
     return noise_of(p.angle_floor_rad, p.angle_per_m, p.angle_per_rad_s, reach_m, image_rate_rad_s)
 
 
 @equation
 def distance_noise(p: PadCameraParameters, reach_m: float, image_rate_rad_s: float) -> float:
-    """Of the distance, as a part of it."""
+    """Standard deviation of the distance, as a part of it."""
     return noise_of(p.distance_floor, p.distance_per_m, p.distance_per_rad_s, reach_m, image_rate_rad_s)
 
 

@@ -95,7 +95,7 @@ def refitted(
     carried: Fitted, epochs: int, *, told: Told | None = None, onboard: Onboard | None = None,
     stated: dict[Sensor, Timing] | None = None,
 ) -> Fitted:  # fmt: skip
-    """The same vehicle whose navigator is told something else, or that carries something else; what is None stays.
+    """A vehicle whose navigator is told something else, or that carries something else; what is None stays.
 
     stated: how old readings are said to be; how old they are stays.
     """

@@ -67,7 +67,7 @@ class Onboard(NamedTuple):
 
 
 def without(onboard: Onboard, *names: str) -> Onboard:
-    """The same vehicle that does not carry these sensors."""
+    """A vehicle that does not carry these sensors."""
     fittings = {name: getattr(onboard.carried, name) for name in names}
     gone = {name: one._replace(clock=one.clock._replace(fitted=0)) for name, one in fittings.items()}
     return onboard._replace(carried=onboard.carried._replace(**gone))

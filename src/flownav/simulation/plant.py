@@ -106,7 +106,7 @@ def refined_inflow(
     guess: Inflow, state: HelicopterState, air: AirMotion, blades: Controls, vehicle: VehicleParameters,
     onboard: Onboard | None,
 ) -> Inflow:  # fmt: skip
-    """As `solved_inflow`, one Halley step on from those of a neighbouring state."""
+    """The inflow of `solved_inflow`, one Halley step on from those of a neighbouring state."""
     tail_m_s = refined_tail_inflow(guess.tail, state, air, blades, vehicle)
     if onboard is not None:
         return Inflow(0.0, tail_m_s)
@@ -153,7 +153,7 @@ def observe_plant(work: Work, lanes: Lanes) -> None:
 
 @equation
 def observe_balanced(work: Work, lanes: Lanes) -> None:
-    """The same of the paper's helicopter."""
+    """Observe the plant of the paper's helicopter."""
     for lane in range(len(lanes)):
         around, vehicle = layout.load_around(work, lanes, lane), layout.vehicle_as_is(work, lanes, lane)
         state = layout.load_helicopter(work, lanes, lane)

@@ -10,7 +10,7 @@ from flownav.sensors.gps_ins import NavSolution
 
 
 class RotorSpeed(NamedTuple):
-    """Of a helicopter's main rotor."""
+    """Speed of a helicopter's main rotor."""
 
     speed_rad_s: float
 

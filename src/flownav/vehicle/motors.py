@@ -70,7 +70,7 @@ def mixed(controls: Controls, hexa: bool, vehicle: MultirotorParameters) -> Six:
 
 @equation
 def shaft_power(speed: float, vehicle: MultirotorParameters) -> float:
-    """Of one rotor [W]."""
+    """Power at the shaft of one rotor [W]."""
     return vehicle.torque_n_m_s2 * speed * speed * speed
 
 
@@ -95,7 +95,7 @@ def root_of_share(share: float) -> float:
 
 @equation
 def roots_of_shares(x: Six, hexa: bool) -> Six:
-    """Of each rotor: the mixer's shares hold for a step, and so do their roots."""
+    """Roots of each rotor's share: the mixer's shares hold for a step, and so do their roots."""
     return Six(
         root_of_share(x.one),
         root_of_share(x.two),

@@ -279,7 +279,7 @@ def with_inflow_held(vehicle: MultirotorParameters) -> MultirotorParameters:
 
 
 def full_thrust(vehicle: MultirotorParameters) -> float:
-    """Of one rotor at the full battery's voltage [N]."""
+    """Thrust of one rotor at the full battery's voltage [N]."""
     return vehicle.thrust_n_s2 * vehicle.full_speed_rad_s**2
 
 

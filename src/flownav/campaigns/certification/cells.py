@@ -124,7 +124,7 @@ class Ends:
         self.names, self.share = names, share
 
     def uniforms(self, seed: int, flights: Sequence[int], name: str) -> NDArray[np.float64]:
-        """The same for every flight."""
+        """One number for every flight."""
         return np.full(len(flights), self.share if name in self.names else 0.5)
 
 

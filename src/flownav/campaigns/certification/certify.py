@@ -57,7 +57,7 @@ class Certificate:
 
     @property
     def verdict(self) -> Verdict:
-        """Of all requirements together."""
+        """The verdict of all requirements together."""
         return joint(judgement.verdict for judgement in self.judgements)
 
     def as_json(self) -> dict[str, Any]:

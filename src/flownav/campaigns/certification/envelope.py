@@ -48,7 +48,7 @@ class Judgement(NamedTuple):
     needs: tuple[int, ...]
 
     def as_json(self) -> dict[str, Any]:
-        """As the certificate has it; null for a figure that is infinite."""
+        """The figures as the certificate has them; null for a figure that is infinite."""
         table = self.table
         return {
             "measure": table.measure,

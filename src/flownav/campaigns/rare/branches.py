@@ -99,7 +99,7 @@ class Space:
         return Branch(self.seed, drawn, {one.name: value for one, value in start}, streams.tolist())
 
     def one(self, branch: Branch) -> Branches:
-        """The same again, as a block of one lane."""
+        """A branch flown again, as a block of one lane."""
         start = np.array([[branch.start[one.name] for one in self.starts]])
         values = {name: [branch.drawn[name]] for name in self.dispersed}
         return self.block(values, start, np.array([branch.streams], np.int64))

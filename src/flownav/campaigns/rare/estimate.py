@@ -161,7 +161,7 @@ class Rare:
         return self.cv is not None and self.cv <= LARGEST_CV
 
     def as_json(self) -> dict[str, Any]:
-        """All of it but the flight, which is a file of its own."""
+        """Everything but the flight, which is a file of its own."""
         own = {name: getattr(self, name) for name in ("event", "probability", "low", "high", "cv", "flights")}
         likely = {"inputs": self.inputs, "noise": self.noise, "response": finite_or_none(self.branch_response)}
         return own | {"confidence": CONFIDENCE, "parts": self.parts, "likely": likely}

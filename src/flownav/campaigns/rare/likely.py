@@ -138,7 +138,7 @@ def rank_inputs(names: list[str], inputs: Array, weights: Array, independent: fl
 
 
 def rank_noise(flight: Flight, seed: int, states: States, weights: Array, independent: float) -> list[dict[str, Any]]:
-    """Of each source the window whose sum of noise differs most, where it does by more than chance.
+    """The window of each source whose sum of noise differs most, where it does by more than chance.
 
     Of many flights the noise of some is looked at, one in so many of them.
 

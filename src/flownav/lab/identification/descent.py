@@ -47,7 +47,7 @@ class Structure(NamedTuple):
 
     @property
     def label(self) -> str:
-        """As the command line names it."""
+        """The order's name on the command line."""
         return "delay" if self.order == 0 else f"{self.order}{'+delay' if self.delay else ''}"
 
 
@@ -285,7 +285,7 @@ def butterworth(order: int, lag_s: float) -> Array:
 
 
 def with_fast_poles(log_a: Array, order: int) -> Array:
-    """The same dynamics with more real poles, FAST_POLE times as fast as the model's own rate and up."""
+    """Dynamics with more real poles, FAST_POLE times as fast as the model's own rate and up."""
     rate = float(np.exp(log_a[-1] / len(log_a)))
     whole = np.concatenate([[1.0], np.exp(log_a)])
     for extra in range(order - len(log_a)):

@@ -34,7 +34,7 @@ class Axes(NamedTuple):
 
     @property
     def right(self) -> bool:
-        """Nothing is swapped or inverted."""
+        """Whether nothing is swapped or inverted."""
         return bool(np.array_equal(self.assignment, np.eye(2)))
 
 

@@ -64,7 +64,7 @@ class NoisePoint(NamedTuple):
 
     @property
     def sigma_rad_s(self) -> float:
-        """The same as an angular rate."""
+        """The standard deviation as an angular rate."""
         return self.sigma_m_s / self.height_m
 
 

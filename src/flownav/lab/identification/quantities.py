@@ -39,12 +39,12 @@ class Interval(NamedTuple):
 
     @classmethod
     def of(cls, value: float, sigma: float) -> Interval:
-        """Of a normal estimate."""
+        """The interval of a normal estimate."""
         return cls(value, value - Z_95 * sigma, value + Z_95 * sigma)
 
     @classmethod
     def of_log(cls, value: float, sigma: float) -> Interval:
-        """Of a positive value whose logarithm is the normal one, with standard deviation sigma."""
+        """The interval of a positive value whose logarithm is the normal one, with standard deviation sigma."""
         spread = float(np.exp(min(Z_95 * sigma, 50.0)))
         return cls(value, value / spread, value * spread)
 

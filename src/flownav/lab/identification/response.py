@@ -282,7 +282,7 @@ def response(of: Order, given: Input, grid: Grid, tried: Tried, y: Array, column
 
 @kernel
 def delayed(given: Input, grid: Grid, gain: float, offset: float, y: Array, columns: Array, sums: Array) -> None:
-    """As `response` for a model without dynamics, y(t) = K u(t - T) + y0; columns: gain, delay, offset, error."""
+    """The response of a model without dynamics, y(t) = K u(t - T) + y0; columns: gain, delay, offset, error."""
     t_u, u, held = given
     for row in range(len(y)):
         at, at_row = grid.sample[row], row if len(columns) > 1 else 0

@@ -101,17 +101,17 @@ def exposed(camera: Camera, illumination: float) -> Exposure:
 
 # -- modulation transfer: what blur does to a pattern of frequency nu [cycles/px] -----------------------------
 def box_transfer(frequency: ArrayLike, length_px: float) -> NDArray[np.float64]:
-    """Of averaging over a length: the pixel's own (1 px), or the way the image moves during the exposure."""
+    """Transfer of averaging over a length: the pixel's own (1 px), or the way the image moves during the exposure."""
     return np.asarray(np.sinc(np.asarray(frequency, float) * length_px))
 
 
 def gauss_transfer(frequency: ArrayLike, sigma_px: float) -> NDArray[np.float64]:
-    """Of a Gaussian blur."""
+    """Transfer of a Gaussian blur."""
     return np.asarray(np.exp(-2.0 * (np.pi * sigma_px * np.asarray(frequency, float)) ** 2))
 
 
 def disc_transfer(frequency: ArrayLike, diameter_px: float, nodes: int = 64) -> NDArray[np.float64]:
-    """Of the blur disc of defocus, 2 J1(x)/x with x = pi D nu; negative where the contrast is reversed.
+    """Transfer of the blur disc of defocus, 2 J1(x)/x with x = pi D nu; negative where the contrast is reversed.
 
     The disc's width at offset s is sqrt(1 - s²): Gauss-Chebyshev quadrature of the second kind is exact.
     """
@@ -122,7 +122,7 @@ def disc_transfer(frequency: ArrayLike, diameter_px: float, nodes: int = 64) -> 
 
 
 def lens_transfer(camera: Camera, frequency: ArrayLike, distance_m: float) -> NDArray[np.float64]:
-    """Of lens and defocus together at a distance (radial frequency [cycles/px])."""
+    """Transfer of lens and defocus together at a distance (radial frequency [cycles/px])."""
     disc = disc_transfer(frequency, defocus_px(camera, distance_m))
     return gauss_transfer(frequency, camera.psf_px) * disc
 

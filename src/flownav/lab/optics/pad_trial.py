@@ -188,7 +188,7 @@ def drawn_pose(optic: Optic, height_m: float, tilt_rad: float, rng: np.random.Ge
 
 
 def drawn_motion(speed_m_s: float, rng: np.random.Generator) -> FlightMotion:
-    """So fast over the ground in any direction, sinking or climbing at a third of it, with the rates of a hover."""
+    """A motion over the ground in any direction, sinking or climbing at a third of its speed, turning as in a hover."""
     way = rng.uniform(-np.pi, np.pi)
     rates = RATE_RAD_S * rng.standard_normal(3)
     down = speed_m_s / 3.0 * rng.standard_normal()

@@ -104,7 +104,7 @@ class Scene(NamedTuple):
 
 
 def shadow_of_vehicle(pose: Pose, gloss: Gloss) -> Shadow:
-    """Of the vehicle that carries the camera: as far from below it as the sun stands low, along its body.
+    """Shadow of the vehicle that carries the camera: as far from below it as the sun stands low, along its body.
 
     Its body and boom are a band of VEHICLE_M about the camera; gloss tells where the sun is.
     """

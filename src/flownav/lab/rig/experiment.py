@@ -53,7 +53,7 @@ class RigSettings:
     camera: Camera = field(default_factory=Camera)
 
     def at(self, height_m: float) -> RigSettings:
-        """The same experiment at another height."""
+        """This experiment at another height."""
         return replace(self, height_m=height_m)
 
 

@@ -140,7 +140,7 @@ def unsigned_vb(content: Bytes, pos: int, end: int) -> tuple[int, int]:
 
 @kernel
 def signed_vb(content: Bytes, pos: int, end: int) -> tuple[int, int]:
-    """The same of a number whose sign is its lowest bit (zigzag)."""
+    """A variable-byte number whose sign is its lowest bit (zigzag)."""
     value, pos = unsigned_vb(content, pos, end)
     return (value >> 1) ^ -(value & 1), pos
 

@@ -29,7 +29,7 @@ class Coding(NamedTuple):
 
 
 class Kinds(NamedTuple):
-    """Of main frames, whole and by difference, slow ones, GPS and home."""
+    """Kinds of frames: main ones, whole and by difference, slow ones, GPS and home."""
 
     i: Coding
     p: Coding
@@ -215,7 +215,7 @@ def frame_end(content: Bytes, pos: int, end: int, kinds: Kinds, m: Memory, base:
 
 @kernel
 def blank_memory(kinds: Kinds) -> Memory:
-    """Nothing but zeros."""
+    """A memory of zeros."""
     fields = len(kinds.i.predictors)
     return Memory(
         np.zeros(fields, np.int64),

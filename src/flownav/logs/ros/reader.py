@@ -173,7 +173,7 @@ def _px4_log(
     path: Path, flown: list[Gathered], others: list[Gathered], inputs: dict[str, str], notes: list[str],
     flow_instance: int | None, asked: Mapping[str, str],
 ) -> Log:  # fmt: skip
-    """As of a ULog; a reference from another topic (motion capture) is laid on PX4's clock by the times of logging."""
+    """A log as of a ULog; another topic's reference (motion capture) is laid on PX4's clock by the times of logging."""
     topics = px4_topics(flown, "", STATES)
     offset_ns = np.median(np.concatenate([each.logged - 1e3 * each.column("timestamp")[:, 0] for each in flown]))
     poses, choice = chosen(others, {name: topic for name, topic in asked.items() if name == "truth"}, None)

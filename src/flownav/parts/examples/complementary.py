@@ -20,7 +20,7 @@ class ComplementaryFilter:
     name = "complementary"
 
     def start(self, told: Told) -> None:
-        """Nothing is known yet."""
+        """Begin: nothing is known yet."""
         self.told, self.attitude, self.pos, self.vel = told.settings, AttitudeFollower(), np.zeros(3), np.zeros(3)
         self.t_s, self.range_m, self.ground_d_m = 0.0, np.nan, np.nan
         self.seen_s: dict[Sensor, float] = {}

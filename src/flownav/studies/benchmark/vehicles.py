@@ -93,7 +93,7 @@ def fly_untaken(flight: Flight, b: Buffers) -> None:
 def step_plants(
     buffer: NDArray[np.float64], lanes: Lanes, steps: int, rotors: tuple[int, ...] | None, onboard: Onboard | None
 ) -> None:
-    """So many steps of physics, observed as a flight observes them; the lanes' vehicles and controls stand in rows."""
+    """Take steps of physics, observed as a flight observes them; the lanes' vehicles and controls stand in rows."""
     work = pointer(buffer)
     for step in range(steps):
         step_vehicle(work, lanes, PHYSICS_S, rotors, onboard)

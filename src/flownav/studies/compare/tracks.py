@@ -35,12 +35,12 @@ class Track(NamedTuple):
 
 
 def of_estimate(rows: Array) -> Track:
-    """Of a replay: rows of a tape's estimate."""
+    """The track of a replay: rows of a tape's estimate."""
     return Track(motion_of(estimate_table(rows)), EstimateRow.of(rows).vel_ned_m_s[:, :2])
 
 
 def of_table(table: Table) -> Track:
-    """Of an autopilot's own estimate; its velocity is NaN where it states none, or no attitude to turn it by."""
+    """The track of an autopilot's estimate; its velocity is NaN where it states none, or no attitude to turn it by."""
     motion, velocity = motion_of(table), velocity_ned(table)
     return Track(motion, np.full((len(motion.t_s), 2), np.nan) if velocity is None else velocity[:, :2])
 
@@ -151,7 +151,7 @@ def _within(t_s: Array, window: Window) -> Flags:
 
 
 def _rms(error: Array) -> float | None:
-    """Of the horizontal length [the unit of error]; None of too few, or of what is not known."""
+    """Root mean square of the horizontal length [the unit of error]; None of too few, or of what is not known."""
     squares = np.sum(error[:, :2] ** 2, axis=1)
     squares = squares[np.isfinite(squares)]
     return float(np.sqrt(np.mean(squares))) if len(squares) >= LEAST_INSTANTS else None

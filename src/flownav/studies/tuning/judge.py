@@ -72,7 +72,7 @@ UNMOVED = Judgement(False, "the fit windows ask for no other setting", None, Non
 
 
 def judge(held: Sequence[Gains], whole: Sequence[bool]) -> Judgement:
-    """Of the gains on held-out windows, log by log; whole: of which logs nothing at all was fitted.
+    """The verdict on the gains on held-out windows, log by log; whole: of which logs nothing at all was fitted.
 
     Accepted where the interval of the errors' gain lies above zero, that of errors and predictions together too, and
     where the errors of the logs that were held out whole did not grow. Better predictions alone are not enough: a

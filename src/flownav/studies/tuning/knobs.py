@@ -140,7 +140,7 @@ def split_flight(log: Log) -> Split:
 
 
 def _length(flight_s: float) -> float:
-    """Of one window and the gap after it [s]: twice as many as are needed where that leaves USUAL_S to each."""
+    """Length of one window and the gap after it [s]: twice as many as are needed where that leaves USUAL_S to each."""
     return min(max(flight_s / (4 * LEAST_JUDGES), USUAL_S), flight_s / (2 * LEAST_JUDGES), LONGEST_S)
 
 

@@ -43,8 +43,8 @@ UNITS = {AGAINST_GPS: "m", AGAINST_TRUTH: "m/s", AGAINST_FLOW: "rad/s"}
 
 
 class Scores(NamedTuple):
-    """Of one run, by window (w,): mean log density of each sensor's readings (w, SENSORS), NaN without any; how many
-    readings that is; logarithm of the path's error, NaN where nothing shows it; the error itself, by UNITS.
+    """One run's scores by window (w,): mean log density of each sensor's readings (w, SENSORS), NaN without any;
+    how many readings that is; logarithm of the path's error, NaN where nothing shows it; the error itself, by UNITS.
     """
 
     density: Array
@@ -175,7 +175,7 @@ def _stretches(windows: Sequence[Window]) -> int:
 
 
 def _log_density(value: Array, variance: Array) -> Array:
-    """Of a normal distribution with Huber's tails, but for its constant, which is the same for every scale."""
+    """Log density of a normal distribution with Huber's tails, but for a constant that is of every scale."""
     z = np.abs(value) / np.sqrt(variance)
     surprise = np.where(z <= HUBER, 0.5 * z**2, HUBER * z - 0.5 * HUBER**2)
     return np.asarray(-0.5 * np.log(variance) - surprise)
@@ -193,7 +193,7 @@ def path_errors(flown: Replay, windows: Sequence[Window]) -> tuple[Array, float]
 
 
 def _flow_errors(innovation: Array, windows: Sequence[Window]) -> Array:
-    """Of flow that was withheld, its difference from what was expected of it [rad/s]."""
+    """Difference of flow that was withheld from what was expected of it [rad/s]."""
     offered = InnovationRow.of(innovation)
     news = offered.innovation
     cut = np.isin(offered.sensor, FLOW) & (offered.reason == Reason.OUTAGE) & np.isfinite(news)

@@ -99,7 +99,7 @@ class Flight:
 
 
 def kept_of(stream: Stream) -> int:
-    """Of how many readings of an IMU the log holds one."""
+    """How many readings of an IMU stand behind each that the log holds."""
     return max(1, math.ceil(SLOWEST_INERTIAL_HZ / rate_hz(stream)))
 
 

@@ -53,7 +53,7 @@ class Smoothed:
         return np.asarray(np.interp(t_s, self.said.t_s, ground_of(self.rows) - self.said.pos_ned_m[:, DOWN]))
 
     def tilt_cosine(self, t_s: Array) -> Array:
-        """Of the angle between body z and the vertical."""
+        """Cosine of the angle between body z and the vertical."""
         rotation = rotation_of(self.said).as_matrix()
         return np.asarray(np.interp(t_s, self.said.t_s, rotation[:, DOWN, DOWN]))
 
@@ -103,7 +103,7 @@ def innovation_figures(flown: Replay) -> dict[str, float]:
 
 
 def _mean(values: list[float]) -> float:
-    """Of those that are known; NaN without one."""
+    """Mean of those that are known; NaN without one."""
     known = [value for value in values if np.isfinite(value)]
     return float(np.mean(known)) if known else float("nan")
 

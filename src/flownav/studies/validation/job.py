@@ -64,7 +64,7 @@ class Row:
         return SHARE_SLACK if self.figure.endswith(SHARES) else 0.0
 
     def as_json(self) -> dict[str, str | float | None]:
-        """As the command prints it."""
+        """What the command prints."""
         return asdict(self)
 
 

@@ -234,7 +234,7 @@ def _second_order(sigma_m_s: float, tau_s: float) -> tuple[float, float, float, 
 def _gradients(
     sigma_down_m_s: float, length_down_m: float, span_m: float, carried_m_s: float
 ) -> tuple[float, float, float, float, float, float, float]:
-    """Coefficients: roll's sigma, decay and drive; of pitch and yaw how fast the slow gusts follow, and 1/m of the rest.
+    """Coefficients: roll's sigma, decay and drive; of pitch and yaw how fast the slow gusts follow, 1/m of the rest.
 
     The variance of p is its spectrum's integral, sigma_w^2 0.8 (pi L_w/4b)^(1/3) pi^2/(8 L_w b).
     """

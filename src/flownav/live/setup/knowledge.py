@@ -97,7 +97,7 @@ class Arming(Rule):
 
 
 class Knowledge(ParameterModel):
-    """Knowledge of a make. notes and in_flight: sentences; first_source_set: flownav's own if none is in use, 0: none."""
+    """A make's knowledge. notes and in_flight: sentences; first_source_set: our own if none is in use, 0: none."""
 
     schema_version: Literal[1]
     make: int

@@ -18,8 +18,7 @@ from command import run
 from flownav.cli import app
 from flownav.core.parameter_files import shipped
 from flownav.core.record import Record
-from flownav.live import link as link_module
-from flownav.live import loop
+from flownav.live import byte_links, loop
 from flownav.live.loop import run_vehicle
 from virtual_link import Clock, VirtualLink
 
@@ -285,7 +284,7 @@ def assert_told(numbers):
 def test_a_flight_is_told_as_an_autopilot_tells_it(tmp_path, monkeypatch):
     clock, numbers = Clock(), Counter()
     link = VirtualLink(clock, hear=lambda frame, now_s: numbers.update([int.from_bytes(frame[7:10], "little")]) or [])
-    monkeypatch.setattr(link_module, "open_link", lambda url: link)
+    monkeypatch.setattr(byte_links, "open_link", lambda url: link)
     monkeypatch.setattr(loop, "run_vehicle", partial(run_vehicle, clock=clock))
     given = [str(short(tmp_path)), "--gps", "midg", "--json", "--no-report", "--out", str(tmp_path / "f.fnr")]
     done = CliRunner().invoke(app, ["fly", *given, "--mavlink", "udpout:127.0.0.1:9", "--speed", "4"])

@@ -234,7 +234,7 @@ def test_what_a_process_adds_to_a_module_is_part_of_whatever_imports_it(tmp_path
     ("text", "imported"),
     [
         ("import flownav.core.frames", ["flownav.core.frames"]),
-        ("from flownav import frames as f", ["flownav", "flownav.core.frames"]),
+        ("from flownav.core import frames as f", ["flownav.core", "flownav.core.frames"]),
         ("from .b import c", ["a.p.b", "a.p.b.c"]),
         ("from . import b", ["a.p", "a.p.b"]),
         ("from .. import b", ["a", "a.b"]),

@@ -91,11 +91,11 @@ def test_the_square_is_flown_within_fifteen_centimetres(link, data_folder, shift
 def test_gps_later_than_the_longest_horizon_is_an_alarm_and_nothing_is_sent(link):
     notes = []
 
-    class Keeper(Keeper):
+    class Listener(Keeper):
         def note(self, t_s, source, kind, detail, value=float("nan")):
             notes.append((source, kind, detail))
 
-    session, _ = play(delayed(link("square", 25.0), GPS_RAW_INT, 1.2), keeper=Keeper())
+    session, _ = play(delayed(link("square", 25.0), GPS_RAW_INT, 1.2), keeper=Listener())
     assert set(session.alarms) == set(GPS)
     assert session.alarms[Sensor.GPS_POSITION].why == "late"
     assert session.reason == "unfused"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ FIGURES = """() => [...document.querySelectorAll("[data-figure]")].map((plot) =>
 class Visit:
     """A page that was opened, and what it complained of."""
 
-    def __init__(self, browser: Any, path: Path, width: int, **options: Any) -> None:
+    def __init__(self, browser: Any, path: Path, width: int, *, watch: str = "", **options: Any) -> None:
         self.width = width
         self.context = browser.new_context(viewport={"width": width, "height": 850}, **options)
         self.context.set_default_timeout(120_000)
@@ -38,6 +39,8 @@ class Visit:
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("requestfailed", lambda request: self.errors.append(f"failed: {request.url[:100]}"))
         self.page.on("request", lambda request: self.requests.append(request.url[:100]))
+        if watch:  # runs in the page before its own scripts do
+            self.page.add_init_script(watch)
         self.page.goto(path.as_uri())
         self.wait()
 
@@ -50,6 +53,17 @@ class Visit:
         while not self.page.evaluate(condition):
             assert time.monotonic() < give_up, condition
             self.page.wait_for_timeout(50)
+
+    def until_it_is(self, read: Callable[[], Any], expected: Any) -> None:
+        """Wait for what is read to be what is expected."""
+        give_up = time.monotonic() + 120.0
+        while (found := read()) != expected:
+            assert time.monotonic() < give_up, (found, expected)
+            self.page.wait_for_timeout(50)
+
+    def paint(self) -> None:
+        """Wait until the page has drawn what was asked of it."""
+        self.page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done())))")
 
     def figures(self) -> dict[str, dict[str, Any]]:
         return {figure["key"]: figure for figure in self.page.evaluate(FIGURES)}

@@ -151,14 +151,12 @@ def test_zooming_one_panel_zooms_all_and_the_button_shows_the_whole_flight(
     assert (t0, t1) == pytest.approx((10.0, 30.0), abs=0.5)
     mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 30)
     visit.until("Math.abs(document.documentElement.dataset.instant - 20) < 0.5")
-    visit.page.wait_for_timeout(300)
-    assert instants(visit) == pytest.approx(0.5, abs=0.01)
+    visit.until_it_is(lambda: instants(visit), pytest.approx(0.5, abs=0.01))
     closer = figures(visit)["touchdown-position-error"]["instants"]  # a close-up stays within its stretch, 8 to 23 s
     assert closer == pytest.approx([(20.0 - 10.0) / (23.0 - 10.0)] * 3, abs=0.02)
     visit.page.locator("#scrub-whole").click()
     visit.until("document.documentElement.dataset.zoom === ''")
-    visit.page.wait_for_timeout(300)
-    assert instants(visit) == pytest.approx(share(20.0), abs=0.01)
+    visit.until_it_is(lambda: instants(visit), pytest.approx(share(20.0), abs=0.01))
     assert visit.errors == []
     visit.context.close()
 
@@ -186,9 +184,10 @@ def test_play_moves_the_instant_and_pause_holds_it(browser: Any, pages: dict[str
     assert visit.page.locator("#scrub-play").get_attribute("aria-label") == "Pause"
     visit.until("document.documentElement.dataset.instant > 5.3")
     visit.page.locator("#scrub-play").click()
-    visit.page.wait_for_timeout(150)
+    visit.until("document.getElementById('scrub-play').getAttribute('aria-label') === 'Play'")
+    visit.paint()
     held = visit.page.evaluate("document.documentElement.dataset.instant")
-    visit.page.wait_for_timeout(300)
+    visit.page.wait_for_timeout(300)  # in which a flight that still played would go on
     assert visit.page.evaluate("document.documentElement.dataset.instant") == held
     visit.context.close()
 
@@ -293,6 +292,27 @@ def test_paper_gets_light_figures_that_fit_and_all_details(browser: Any, pages: 
     visit.context.close()
 
 
+DRAWN_IN_ORDER = """window.drawnInOrder = [];
+new MutationObserver((changes) => {
+  for (const { target } of changes) {
+    const key = target.dataset.figure;
+    if (key && target.dataset.drawn && !window.drawnInOrder.includes(key)) window.drawnInOrder.push(key);
+  }
+}).observe(document, { subtree: true, attributes: true, attributeFilter: ["data-drawn"] });"""
+FROM_THE_TOP = """[...document.querySelectorAll("[data-figure]")]
+  .sort((a, b) => a.getBoundingClientRect().top - b.getBoundingClientRect().top)
+  .map((figure) => figure.dataset.figure)"""
+
+
+def test_what_stands_higher_is_drawn_first(browser: Any, pages: dict[str, Path]) -> None:
+    visit = Visit(browser, pages["landing"], width=1440, watch=DRAWN_IN_ORDER)
+    drawn = visit.page.evaluate("window.drawnInOrder")
+    assert len(drawn) > 10
+    assert drawn == visit.page.evaluate(FROM_THE_TOP)
+    visit.context.close()
+
+
+@pytest.mark.real_time
 @pytest.mark.parametrize("page", ["landing", "replay"])
 def test_the_first_figure_stands_within_two_seconds(browser: Any, pages: dict[str, Path], page: str) -> None:
     visit = Visit(browser, pages[page], width=1440)

@@ -237,24 +237,3 @@ def test_a_kernel_is_compiled_for_many_steps():
 
     assert sparingly(half, FEW_STEPS + 1, 2.0) == 1.0
     assert half.is_ready(2.0)
-
-
-def branching(n):
-    x = 1.0 if n > 2 else 2.0
-    return x if n > 4 else -x
-
-
-def looping(n):
-    x = 0.0
-    for i in range(n):
-        x += i
-    return x
-
-
-@pytest.mark.parametrize(("function", "loops"), [(branching, False), (looping, True)])
-def test_a_loop_is_a_way_back_not_a_branch(function, loops, monkeypatch):
-    found = []
-    original = target._has_loop
-    monkeypatch.setattr(target, "_has_loop", lambda function: found.append(original(function)) or found[-1])
-    kernel(function).compile((numba.int64,))
-    assert any(found) is loops

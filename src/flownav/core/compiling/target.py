@@ -220,18 +220,14 @@ def _called(library: Any) -> list[Any]:
 
 
 def _has_loop(function: ir.Function) -> bool:
-    """Whether some path through a function's blocks comes back to where it was."""
-    after = {block.name: _following(block) for block in function.blocks}
-    while ends := [name for name, names in after.items() if not names & after.keys()]:
-        for name in ends:
-            del after[name]
-    return bool(after)
-
-
-def _following(block: ir.Block) -> set[str]:
-    """The names of the blocks to which a block may jump."""
-    operands = block.terminator.operands if block.terminator is not None else ()
-    return {operand.name for operand in operands if isinstance(operand, ir.Block)}
+    """Whether some block of a function jumps back to itself or to one before it."""
+    order = {block.name: place for place, block in enumerate(function.blocks)}
+    return any(
+        isinstance(operand, ir.Block) and order[operand.name] <= place
+        for place, block in enumerate(function.blocks)
+        if block.terminator is not None
+        for operand in block.terminator.operands
+    )
 
 
 class LeanCodegen(JITCPUCodegen):

@@ -13,6 +13,7 @@ import pytest
 
 from flownav.core.compile import LANES, ONE_LANE, equation, kernel, pointer, procedure, sparingly, unit
 from flownav.core.compiling import target
+from flownav.core.compiling.cache import STORE
 from flownav.core.compiling.engine import FEW_STEPS, MOST_SPARED
 
 ROTATIONS = """
@@ -218,16 +219,27 @@ def test_what_is_done_for_the_lack_of_something_that_is_there_is_not_compiled():
     assert run(3.0) == 6.0
 
 
-def test_a_kernel_is_spared_a_few_times_for_few_steps():
+def test_a_kernel_is_spared_a_few_times_for_few_steps(monkeypatch):
     @kernel
     def root(value):
         return np.sqrt(value)
 
+    monkeypatch.setattr(STORE, "holds", lambda name: False)  # whatever an earlier run has kept
     for _ in range(MOST_SPARED):
         assert sparingly(root, 1, 2.0) == np.sqrt(2.0)
         assert not root.is_ready(2.0)
     assert sparingly(root, 1, 2.0) == np.sqrt(2.0)
     assert root.is_ready(2.0)
+
+
+def test_a_kernel_that_was_kept_is_not_spared(monkeypatch):
+    @kernel
+    def cube(value):
+        return value**3
+
+    monkeypatch.setattr(STORE, "holds", lambda name: True)
+    assert sparingly(cube, 1, 2.0) == 8.0
+    assert cube.is_ready(2.0)
 
 
 def test_a_kernel_is_compiled_for_many_steps():

@@ -11,7 +11,6 @@ from filters import SETTINGS, Filter, N, filter_at, random_covariance
 from flownav.core.compile import ONE_LANE
 from flownav.estimation.error_models import (
     FilterSettings,
-    propagate_errors,
     propagate_gauss_markov,
     propagate_walks,
 )
@@ -74,7 +73,8 @@ def test_the_errors_of_one_step_are_a_diagonal_transition_and_a_diagonal_noise(s
     factor[markov] = np.exp(-dt_s / tau_s[markov])
     noise = walks(SETTINGS) ** 2 * dt_s + sigma**2 * (1.0 - factor**2)
     x, p = factor * filter_.x, np.outer(factor, factor) * filter_.p + np.diag(noise)
-    propagate_errors(filter_.work, ONE_LANE, N, dt_s, SETTINGS)
+    propagate_walks(filter_.work, ONE_LANE, dt_s, SETTINGS)
+    propagate_gauss_markov(filter_.work, ONE_LANE, N, dt_s, SETTINGS)
     assert filter_.x == pytest.approx(x, rel=1e-14)
     assert np.allclose(filter_.p, p, rtol=1e-12, atol=1e-15)
 

@@ -19,7 +19,7 @@ from flownav.estimation.covariance import (
     settle,
     variance_of,
 )
-from flownav.estimation.error_models import propagate_errors, propagate_gauss_markov, propagate_walks
+from flownav.estimation.error_models import propagate_gauss_markov, propagate_walks
 from flownav.estimation.lag import lag_ends, lag_starts
 from flownav.estimation.laws.attitude import attitude, bridged_attitude, heading
 from flownav.estimation.laws.flow import body_velocity, flow_rate, lagged_flow
@@ -70,7 +70,8 @@ def every_step(buffer, lanes, settings, lag):  # type: ignore[no-untyped-def]
     lag_starts(work, lanes, lag)
     predict(work, lanes, n, 0.02, settings)
     lag_ends(work, lanes, lag)
-    propagate_errors(work, lanes, n, 0.02, settings)
+    propagate_walks(work, lanes, 0.02, settings)
+    propagate_gauss_markov(work, lanes, n, 0.02, settings)
     propagate_walks(work, lanes, 0.3, settings)
     propagate_gauss_markov(work, lanes, n, 0.3, settings)
     for axis in range(3):

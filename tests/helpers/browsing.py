@@ -49,10 +49,7 @@ class Visit:
 
     def until(self, condition: str) -> None:
         """Wait for a condition; asked from here, since the page's policy lets nothing evaluate text inside it."""
-        give_up = time.monotonic() + 120.0
-        while not self.page.evaluate(condition):
-            assert time.monotonic() < give_up, condition
-            self.page.wait_for_timeout(50)
+        self.until_it_is(lambda: (condition, bool(self.page.evaluate(condition))), (condition, True))
 
     def until_it_is(self, read: Callable[[], Any], expected: Any) -> None:
         """Wait for what is read to be what is expected."""

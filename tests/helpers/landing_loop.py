@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from flownav.core.compile import Lanes, Work, equation, kernel, pointer
 from flownav.estimation.covariance import expect, settle
-from flownav.estimation.error_models import FilterSettings, propagate_errors, propagate_gauss_markov
+from flownav.estimation.error_models import FilterSettings, propagate_gauss_markov, propagate_walks
 from flownav.estimation.lag import FlowLag, lag_ends, lag_starts
 from flownav.estimation.laws.attitude import attitude
 from flownav.estimation.laws.flow import flow_rate, lagged_flow
@@ -58,7 +58,8 @@ def run_landing_filter(buffer: Work, lanes: Lanes, steps: int, settings: FilterS
         if lag is not None:
             lag_starts(work, lanes, lag)
         predict(work, lanes, n, STEP_S, settings)
-        propagate_errors(work, lanes, n, STEP_S, settings)
+        propagate_walks(work, lanes, STEP_S, settings)
+        propagate_gauss_markov(work, lanes, n, STEP_S, settings)
         if lag is not None:
             lag_ends(work, lanes, lag)
         for axis in range(3):

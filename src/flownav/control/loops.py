@@ -19,11 +19,11 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from flownav.control.gains import AutopilotGains
 from flownav.core.frames import GRAVITY_M_S2
+from flownav.core.measurement import Array
 from flownav.vehicle.linearize import INPUTS, OUTPUTS, Complex, LinearPlant
 
 INNER_S = 0.004
@@ -50,8 +50,6 @@ LOOPS = tuple(CUTS)
 SIGNALS = tuple(CUTS.values())
 PLACE = {name: i for i, name in enumerate(SIGNALS)}
 _BLADES = [PLACE[name] for name in INPUTS]
-
-Array = NDArray[np.float64]
 
 
 class Timing(NamedTuple):

@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.control.design import gains_for
 from flownav.control.gains import AutopilotGains
 from flownav.control.loops import LOOPS, loop_gains, spectral_radius
 from flownav.core.errors import InputError
+from flownav.core.measurement import Array
 from flownav.core.text import finite
 from flownav.vehicle.corners import corners
 from flownav.vehicle.kinds import AnyVehicle, hover_of, load_vehicle
@@ -90,9 +90,6 @@ def _plants(name: str, vehicle: AnyVehicle) -> Iterator[tuple[str, LinearPlant]]
         yield f"{name}, {INFLOW_HELD}" if held else name, hover_plant(vehicle, about, freeze_inflow=held)
     if isinstance(vehicle, VehicleParameters) and isinstance(about, Trim):
         yield f"{name}, {ROTOR_FREE}", rotor_plant(vehicle, about)
-
-
-Array = NDArray[np.float64]
 
 
 class Margins(NamedTuple):

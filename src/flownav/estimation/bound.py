@@ -8,9 +8,8 @@ Processing 46(5), 1998, equations 21 and 34-36. A nonlinear model hands in its J
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from flownav.core.measurement import Array
 
 
 def posterior_bound(

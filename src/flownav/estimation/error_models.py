@@ -10,9 +10,9 @@ together, later, for as long as no law has read them in between.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.core.compile import Lanes, Work, equation, exp, procedure, squared
+from flownav.core.measurement import Array
 from flownav.estimation.covariance import add_noise, decay
 from flownav.estimation.states import (
     ACCEL_BIAS,
@@ -60,13 +60,6 @@ class FilterSettings(NamedTuple):
 
 
 @procedure
-def propagate_errors(work: Work, lanes: Lanes, n: int, dt_s: float, settings: FilterSettings) -> None:
-    """Both kinds of error, dt on."""
-    propagate_walks(work, lanes, dt_s, settings)
-    propagate_gauss_markov(work, lanes, n, dt_s, settings)
-
-
-@procedure
 def propagate_walks(work: Work, lanes: Lanes, dt_s: float, settings: FilterSettings) -> None:
     """Random walks, dt on. They must not lag behind the motion, which reads the biases."""
     for axis in range(3):
@@ -102,7 +95,6 @@ def forget(work: Work, lanes: Lanes, n: int, state: int, sigma: float, factor: f
     add_noise(work, lanes, state, sigma * sigma * (1.0 - factor * factor))
 
 
-Array = NDArray[np.float64]
 TAYLOR_ORDER = 12  # of a norm of 1/16 at most, whose next term is 4e-26: exact to rounding (test_discretise)
 
 

@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.core.errors import InputError
 from flownav.core.guard import written_whole
+from flownav.core.measurement import Array
 from flownav.core.record import POSITION_NED, Record
 from flownav.export.tables import stamps
 from flownav.export.trajectory import Trajectory, trajectories
@@ -47,7 +47,6 @@ UNDATED_S = 1e9  # a clock below this counts from a boot, not from 1970
 MOST_ALTITUDE_M = 1e5
 
 Origin = tuple[float, float, float]
-Array = NDArray[np.float64]
 
 
 def tum_text(path: Trajectory, frame: str) -> str:

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 
 from flownav.core.errors import InputError
 from flownav.core.frames import quaternion_product, rotation_from_quaternion, to_earth
+from flownav.core.measurement import Array
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record, Table
-
-Array = NDArray[np.float64]
 
 PATHS = ("estimate", "smoothed", "truth", "autopilot")
 FRAMES = ("ned", "enu")

@@ -7,17 +7,12 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple, Protocol, runtime_checkable
 
-import numpy as np
-from numpy.typing import NDArray
-
 from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import Reference
-from flownav.core.measurement import Sensor
+from flownav.core.measurement import Array, Sensor
 from flownav.navigation.told import NavigatorSettings
 from flownav.vehicle.around import Around
 from flownav.vehicle.state import Controls
-
-Array = NDArray[np.float64]
 
 UNKNOWN = (math.nan, math.nan, math.nan)
 NO_BIAS = (0.0, 0.0, 0.0)

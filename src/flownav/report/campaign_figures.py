@@ -5,13 +5,11 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flownav.core.measurement import Array
 from flownav.report.chart import drawn
 from flownav.report.panels import Panel
 from flownav.report.style import COLOUR, FONT, axis, layout, plotly
-
-Array = NDArray[np.float64]
 
 DOTS = 2500
 FAR_M = 2.0  # from here on distances are drawn on a logarithmic axis

@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.core.measurement import Array
 from flownav.report.campaign_figures import DIRECTION, SPEED
 from flownav.report.chart import drawn
 from flownav.report.panels import Panel
 from flownav.report.style import COLOUR, axis, layout
-
-Array = NDArray[np.float64]
 
 INPUT_WORDS = {SPEED: "wind at 20 ft (m/s)", DIRECTION: "wind from (°)"}
 KNOWN_WORDS = {

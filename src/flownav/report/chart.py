@@ -8,7 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.report.series import Array, Moment, Window
+from flownav.core.measurement import Array
+from flownav.report.series import Moment, Window
 
 LINE_POINTS = 3000  # a drawn line has at most so many points
 DOT_POINTS = 900  # a cloud of readings so many dots

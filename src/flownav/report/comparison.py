@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from flownav.core import guard
+from flownav.core.measurement import Array
 from flownav.core.record import Record
 from flownav.core.version import __version__
 from flownav.report.chart import Stack, sliding_mean
@@ -18,7 +19,7 @@ from flownav.report.html import (
     template,
 )
 from flownav.report.panels import Panel, Section, number
-from flownav.report.series import Array, Track, Window, start_end_s
+from flownav.report.series import Track, Window, start_end_s
 from flownav.report.style import FONT, PALETTE
 from flownav.scoring.phases import phases_of
 

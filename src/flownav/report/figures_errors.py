@@ -5,13 +5,13 @@ Where nobody knows the truth, what the estimate differs from GPS by.
 
 import numpy as np
 
-from flownav.core.measurement import Sensor
+from flownav.core.measurement import Array, Sensor
 from flownav.core.record import POSITION_NED, VELOCITY_BODY, VELOCITY_NED, Record
 from flownav.report import series
 from flownav.report.chart import Stack, sliding_mean, sliding_rms
 from flownav.report.figures_states import View, position, velocity
 from flownav.report.panels import MINUS, Panel, listed, number
-from flownav.report.series import Array, Moment, Track, Window, has, moments, outages, readings, track
+from flownav.report.series import Moment, Track, Window, has, moments, outages, readings, track
 
 POSITION_ERRORS = ("x error (m)", "y error (m)", "z error (m)")
 VELOCITY_ERRORS = ("u error (m/s)", "v error (m/s)", "w error (m/s)")

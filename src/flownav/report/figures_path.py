@@ -6,11 +6,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.measurement import Sensor
+from flownav.core.measurement import Array, Sensor
 from flownav.core.record import POSITION_NED, Record
 from flownav.report.chart import LINE_POINTS, thin
 from flownav.report.panels import Panel, listed
-from flownav.report.series import Array, Track, Window, at, estimates, moments, outages, readings
+from flownav.report.series import Track, Window, at, estimates, moments, outages, readings
 
 JUMP_M = 0.5  # from one row to the next: what is flown on jumps so far as a pad is found
 

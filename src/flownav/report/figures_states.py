@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.core.measurement import COLUMNS, Sensor
+from flownav.core.measurement import COLUMNS, Array, Sensor
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.report import series
 from flownav.report.chart import Stack, sliding_mean, sliding_rms, thin
 from flownav.report.panels import Panel, listed
-from flownav.report.series import Array, Track, Window, has, moments, outages, readings, track
+from flownav.report.series import Track, Window, has, moments, outages, readings, track
 
 POSITION_TITLES = ("x, north (m)", "y, east (m)", "z, down (m)")
 VELOCITY_TITLES = ("u, forward (m/s)", "v, right (m/s)", "w, down (m/s)")

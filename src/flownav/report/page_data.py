@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from flownav.core.measurement import Array
 from flownav.report.chart import CROSS_POINTS, DOT_POINTS, LINE_POINTS, Chart, Series, thin, thin_dots
 from flownav.report.figures_path import Paths, drawn_rows
 from flownav.report.panels import Section
-from flownav.report.series import Array
 
 DIGITS = 6  # decimal places below the leading one of a column's largest value
 FINEST_TIME_S = 1e-6

@@ -7,13 +7,11 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flownav.core.measurement import COLUMNS, Sensor
+from flownav.core.measurement import COLUMNS, Array, Sensor
 from flownav.core.record import QUATERNION, Record
 from flownav.scoring.phases import phases_of
 
-Array = NDArray[np.float64]
 Window = tuple[float, float]
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.core.measurement import Array
 from flownav.report.chart import (
     CROSS_POINTS,
     DOT_POINTS,
@@ -23,7 +24,7 @@ from flownav.report.chart import (
     thin,
     thin_dots,
 )
-from flownav.report.series import Array, Window
+from flownav.report.series import Window
 
 # role: (on light, on dark)
 PALETTE: dict[str, tuple[str, str]] = {

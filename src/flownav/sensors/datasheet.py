@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, ValidationInfo, field_validator
 
 from flownav.core.errors import InputError
+from flownav.core.measurement import Array
 from flownav.core.parameter_files import Number, ParameterModel, load, shipped
 from flownav.sensors.noise_law import Noise, not_below
 
@@ -22,8 +22,6 @@ DEFAULT_SENSOR = "px4flow_paper.toml"
 UNTURNED = ((1.0, 0.0), (0.0, 1.0))
 BAND_HZ = 1.0  # of the closed loop: attitude follows to 5.4 rad/s (`simulation.assemble`), velocity less far
 DELAY_WITHIN_DEG = 10.0  # a delay stands for dynamics whose phase it follows so well
-
-Array = NDArray[np.float64]
 
 
 class Dynamics(ParameterModel):

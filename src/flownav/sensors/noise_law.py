@@ -16,13 +16,12 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
 from pydantic import Field, ValidationInfo, field_validator
 
+from flownav.core.measurement import Array
 from flownav.core.parameter_files import Number, ParameterModel
 from flownav.sensors.flow import NOISE_DEGREE
 
-Array = NDArray[np.float64]
 Law = Callable[[Array], Array]
 WORST_FIT = 1e-3
 

@@ -22,13 +22,11 @@ from typing import Any, Literal, Protocol
 from zlib import crc32
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
+from flownav.core.measurement import Array
 from flownav.core.parameter_files import Number, ParameterModel, load, shipped
 from flownav.simulation.noise import threefry
-
-Array = NDArray[np.float64]
 
 Known = Literal["build", "day", "never"]
 

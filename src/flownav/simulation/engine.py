@@ -8,10 +8,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.core.compile import LANES, ONE_LANE, announce_compilation, compile_beside
-from flownav.core.measurement import Sensor
+from flownav.core.measurement import Array, Sensor
 from flownav.navigation.memory import new_work
 from flownav.navigation.packed import load_flow_settings
 from flownav.navigation.take import navigator_unit
@@ -26,7 +25,6 @@ from flownav.simulation.navigating import first_inertial, kept_inertials
 from flownav.simulation.plan import PHYSICS_S, Flight
 from flownav.simulation.truth import SensorFault, Truth, packed_truth
 
-Array = NDArray[np.float64]
 Result = TypeVar("Result")
 
 SAID_OF_ONE = "the simulator, once, about 30 s"

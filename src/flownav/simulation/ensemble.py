@@ -9,9 +9,9 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.core.errors import InputError
+from flownav.core.measurement import Array
 from flownav.core.parameter_files import ParameterModel, check
 from flownav.sensors.datasheet import FlowSensor
 from flownav.sensors.sheets import SensorSheets
@@ -24,8 +24,6 @@ from flownav.simulation.scenario import Scenario
 from flownav.simulation.truth import LATE, NAMES, PARTS, PUNCTUAL, SIZES, SOUND, Carried, Truth
 from flownav.vehicle.kinds import AnyFile, AnyVehicle, VehicleDescription, as_the_paper_has_it, disc_of, flattened
 from flownav.vehicle.schema import MultirotorFile, VehicleFile
-
-Array = NDArray[np.float64]
 
 WORLD = ("vehicle", "wind", "ground", "recirculation")
 SHEETS = (*NAMES, "flow_sensor", "magnetic_field")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.measurement import COLUMNS, Sensor
+from flownav.core.measurement import COLUMNS, Array, Sensor
 from flownav.core.provenance import command_line, provenance
 from flownav.core.record import FED, POSITION_NED, PROTECTION_LEVELS, QUATERNION, TABLES, VELOCITY_BODY, Record, Table
 from flownav.navigation.records import Reading
@@ -20,7 +20,6 @@ from flownav.simulation.engine import Flown
 from flownav.simulation.history import HISTORY
 from flownav.simulation.sensing import EPOCH_S, RANGE_EPOCHS
 
-Array = NDArray[np.float64]
 GATE_SIGMA_SHOWN = 3.0  # the paper's filter has no gate: its test ratios are shown against 3 sigma and all are fused
 
 

@@ -129,14 +129,19 @@ def clock_of(sheet: SensorSheet, phase: int, readings: int) -> Clock:
 
 
 class Wishes(Protocol):
-    """What a scenario says of sensors itself, above their files; no camera for the pad where pad_fix is None."""
+    """What a scenario says of sensors itself, above their files."""
 
     @property
-    def gps(self) -> GpsInsSettings: ...  # noqa: D102
+    def gps(self) -> GpsInsSettings:
+        """The receiver's errors."""
+
     @property
-    def rangefinder(self) -> RangefinderSettings: ...  # noqa: D102
+    def rangefinder(self) -> RangefinderSettings:
+        """The rangefinder's limits and noise."""
+
     @property
-    def pad_fix(self) -> PadFixSettings | None: ...  # noqa: D102
+    def pad_fix(self) -> PadFixSettings | None:
+        """The pad camera's view and noise; None where there is no such camera."""
 
 
 def as_filed(scenario: Wishes, sheet: Sheet, lens_down_m: float) -> Sheet:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.core.measurement import Array
 from flownav.sensors.gps_ins import GpsInsNormals
 from flownav.simulation import layout
 from flownav.simulation.block import RECIRCULATION_CHANNEL
@@ -18,8 +19,6 @@ from flownav.simulation.onboard import ALWAYS, EPOCH_S, PHYSICS_PERIOD_S, Clock,
 from flownav.simulation.plan import Flight
 from flownav.simulation.sensing import RANGE_EPOCHS
 from flownav.simulation.wind import WindNormals
-
-Array = NDArray[np.float64]
 
 SPARE = "spare"  # a field that makes a count even, and is drawn for nothing
 

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flownav.core.measurement import Array
 from flownav.sensors.flow import FlowParameters
 from flownav.sensors.geometry import Ground
 from flownav.simulation.carried import carried_sensors
@@ -65,9 +65,6 @@ class SensorFault(NamedTuple):
 
 
 SOUND = SensorFault()
-
-
-Array = NDArray[np.float64]
 
 
 CARRIED = carried_sensors()

@@ -8,11 +8,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.core.errors import InputError
+from flownav.core.measurement import Array
 
-Array = NDArray[np.float64]
 PlainEquation = Callable[[Sequence[Any]], Sequence[Any]]
 
 STEP = 1e-30

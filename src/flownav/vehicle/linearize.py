@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
 from flownav.core.frames import rotation_from_quaternion, to_earth
+from flownav.core.measurement import Array
 from flownav.core.parameter_files import Number, ParameterModel, load, shipped
 from flownav.vehicle import airframe, helicopter, multirotor
 from flownav.vehicle.around import CALM
@@ -40,8 +41,6 @@ INPUTS = ("lon", "lat", "col", "ped")
 
 # The fins lift with |u|, which has a kink in hover: the derivatives are the mean of both sides.
 BESIDE_HOVER_M_S = 1e-9
-
-Array = NDArray[np.float64]
 
 
 class LinearModel(NamedTuple):

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from numpy.typing import NDArray
 
+from flownav.core.measurement import Array
 from flownav.core.record import Record
 from flownav.export.trajectory import BOUND, ERROR, Trajectory, error_table
 from flownav.export.viewing.scene import COLOURS, EARTH, NED, TIMELINE, times
@@ -14,7 +14,6 @@ from flownav.export.viewing.scene import COLOURS, EARTH, NED, TIMELINE, times
 PLOTS = "/plots"
 AXES = ("north_m", "east_m", "down_m")
 SPEEDS = ("north_m_s", "east_m_s", "down_m_s")
-Array = NDArray[np.float64]
 SHORTEST_EYE_M = 3.0
 
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
+from flownav.core.measurement import Array
 from flownav.core.record import POSITION_NED, Record
 from flownav.export.trajectory import ENU_FROM_NED, SIGMAS, Trajectory
 from flownav.export.viewing.shapes import Camera, cameras, flow_arrows, vehicle_outline
@@ -23,8 +23,6 @@ AXIS_M, CAMERA_PLANE_M = 0.25, 0.4
 # an image's right, down and depth in body FRD, as columns
 DOWN_LOOKING = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 STEPS_PX = 1000.0  # side of an image whose pixels the record does not state
-
-Array = NDArray[np.float64]
 
 
 def times(t_s: Array) -> Any:

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.frames import velocity_from_flow
+from flownav.core.measurement import Array
 from flownav.core.record import Record
 
-Array = NDArray[np.float64]
 Outline = Array  # (n, 3) points of one line in body FRD [m]
 
 CIRCLE_POINTS = 48

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from flownav.api.calls import kept_file, merged
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import check, read_toml, shipped
-from flownav.lab.identification.sensor_file import write_sensor
 from flownav.sensors.datasheet import DEFAULT_SENSOR, FlowSensor
 
 if TYPE_CHECKING:
@@ -149,6 +148,8 @@ class Sensor:
         path = Path(path)
         if path.suffix != ".toml":
             raise InputError(f"{path}: a sensor file's name ends in .toml")
+        from flownav.lab.identification.sensor_file import write_sensor
+
         write_sensor(path, self.entries)
         return path
 

@@ -274,6 +274,12 @@ def set_variance(work: Work, lanes: Lanes, state: int, lane: int, variance: floa
 
 
 @equation
+def set_covariance(work: Work, lanes: Lanes, i: int, j: int, lane: int, covariance: float) -> None:
+    """P_ij of a lane is this."""
+    work[place(i, j) * len(lanes) + lane] = covariance
+
+
+@equation
 def variance_of(work: Work, lanes: Lanes, state: int, lane: int) -> float:
     """P_ii of a lane."""
     value: float = work[at(state, state) * len(lanes) + lane]

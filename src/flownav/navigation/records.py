@@ -30,7 +30,7 @@ class Reading(NamedTuple):
 
 class StartMemory(NamedTuple):
     """started: 1 once the filter runs. Before that, the newest attitude that was read and its time [s], the mean
-    specific force [m/s2] of so many readings, and the mean square of an axis about it [m2/s4].
+    specific force [m/s2] of so many readings, the mean square of an axis about it [m2/s4], and when the first came [s].
     """
 
     started: float = 0.0
@@ -44,6 +44,7 @@ class StartMemory(NamedTuple):
     force_z: float = 0.0
     readings: float = 0.0
     shaken: float = 0.0
+    since_s: float = 0.0
 
 
 class AidMemory(NamedTuple):

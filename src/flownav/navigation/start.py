@@ -4,12 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.core.compile import Lanes, Work, arctan2, equation, procedure, replacing, squared
-from flownav.core.frames import GRAVITY_M_S2, Quaternion, quaternion_from_euler, rotation_from_quaternion
+from flownav.core.compile import Lanes, Work, arctan2, equation, larger, procedure, replacing, squared
+from flownav.core.frames import GRAVITY_M_S2, Quaternion, Rotation, quaternion_from_euler
 from flownav.core.measurement import Sensor
-from flownav.estimation.covariance import begin_lane, lagged, set_variance, states_of
+from flownav.estimation.covariance import begin_lane, lagged, set_covariance, set_variance, states_of
 from flownav.estimation.hypotheses import COUNT, begin_lane_anew
-from flownav.estimation.named import Attitude, PositionNed
+from flownav.estimation.laws.geometry import component
+from flownav.estimation.named import Attitude, PositionNed, rotation_by
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, POSITION, RATE, VELOCITY
 from flownav.navigation.course import with_sought
 from flownav.navigation.lagged_flow import start_lag
@@ -29,7 +30,7 @@ from flownav.navigation.vibration import with_reading
 ORIGIN_SIGMA_M = 0.1  # the local origin, where the navigator's start defines it
 LOST_SIGMA_M = 10.0  # the same where the log's fixes define it and came too late, and about a first fix
 READ_TILT_RAD = 0.03  # an attitude that was read: three times the autopilot's usual error (ins_tilt_sigma_rad)
-STANDING_TILT_RAD = 0.07  # before anything is read, 4 deg; a shaken force believed wholly fails test_start
+STANDING_TILT_RAD = 0.1  # before anything is read: a helicopter hovers with 5.7 deg of roll, a slope may have 3 deg
 LEVELLED_FLOOR_RAD = 0.005  # of one from the accelerometer; the sum covers the truth (test_start)
 READ_HEADING_RAD = 0.1  # an autopilot's, whose compass is calibrated: outdoor's is 5 to 7 deg off the course for 50 s
 UNKNOWN_RAD = 1.5  # one that is to be found from the course: any of half a turn
@@ -37,8 +38,10 @@ COMPASS_HEADING_RAD = 0.3  # a raw magnetometer's: twice the usual hard iron (co
 DATUM_HEADING_RAD = 1e-3  # the start defines the frame
 UNTOLD_HEADING_RAD = 1.0  # the first heading that is told will, 0.5 rad off (test_an_external_heading_is_taken)
 LEAST_LEVELLING, MOST_LEVELLING = 5.0, 100.0  # readings whose mean is level: 0.1 to 2 s at 50 Hz
+LEVELLING_S = 1.0  # and for so long: of 24 Hz of 1.5 m/s2 are left 0.1 m/s2, 0.6 deg; five readings leave 5 deg
+RECTIFIED_SHARE = 0.1  # of what shakes an accelerometer lasts in its mean: chosen; 1 is the false roll of `landing`
 
-with_force = replacing(StartMemory, "force_x", "force_y", "force_z", "readings", "shaken")
+with_force = replacing(StartMemory, "force_x", "force_y", "force_z", "readings", "shaken", "since_s")
 with_attitude = replacing(StartMemory, "attitude_s", "qw", "qx", "qy", "qz")
 with_started = replacing(StartMemory, "started")
 
@@ -63,7 +66,7 @@ _, store_doubt = MEMORY.access(ScaleDoubt)
 
 # -- before the start -----------------------------------------------------------------------------------------
 @equation
-def levelled(reading: Reading, m: StartMemory) -> StartMemory:
+def levelled(reading: Reading, m: StartMemory, t_s: float) -> StartMemory:
     """The mean specific force [m/s2], and how it is shaken, with one reading more."""
     share = 1.0 / min(m.readings + 1.0, MOST_LEVELLING)
     x, y, z = reading.value_3 - m.force_x, reading.value_4 - m.force_y, reading.value_5 - m.force_z
@@ -75,6 +78,7 @@ def levelled(reading: Reading, m: StartMemory) -> StartMemory:
         force_z=m.force_z + share * z,
         readings=m.readings + 1.0,
         shaken=m.shaken + share * (square - m.shaken),
+        since_s=m.since_s if m.readings > 0.0 else t_s,
     )
 
 
@@ -113,7 +117,7 @@ def note_force(reading: Reading, m: StartMemory, imu: ImuMemory, *, t_s: float) 
     gyro = reading.value_0 + reading.value_1 + reading.value_2
     finite = bool(np.isfinite(gyro + reading.value_3 + reading.value_4 + reading.value_5))
     noted = m.started == 0.0 and reading.arrived > 0.0 and finite
-    return Levelled(levelled(reading, m) if noted else m, with_reading(reading, t_s, imu) if noted else imu)
+    return Levelled(levelled(reading, m, t_s) if noted else m, with_reading(reading, t_s, imu) if noted else imu)
 
 
 @procedure
@@ -139,7 +143,8 @@ def starts(reading: Reading, m: StartMemory, t_s: float, sensor: int, deadline_s
     """Whether a lane whose attitude is known starts: at a fix, or at the local origin with the first flow, pose or word
     that the vehicle stands, where no fix came in time.
     """
-    waiting = m.started == 0.0 and (bool(np.isfinite(m.attitude_s)) or m.readings >= LEAST_LEVELLING)
+    levels = m.readings >= LEAST_LEVELLING and t_s - m.since_s >= LEVELLING_S
+    waiting = m.started == 0.0 and (bool(np.isfinite(m.attitude_s)) or levels)
     other = sensor == Sensor.FLOW_RATE or sensor == Sensor.FLOW_VELOCITY or sensor == Sensor.POSE
     stands = sensor == Sensor.LANDED and reading.value_0 > ON_GROUND
     heard = is_heard(reading) and bool(np.isfinite(reading.value_0))
@@ -152,20 +157,31 @@ def any_starts(reading: Reading, m: StartMemory, *, t_s: float, sensor: int, dea
     return starts(reading, m, t_s, sensor, deadline_s)
 
 
+class Levelling(NamedTuple):
+    """What the mean specific force says: how far it is believed, the accelerometer's bias forward and to the right
+    [m/s2], the variances of tilt, of that bias and of the vertical one, and of tilt and bias together [rad m/s2].
+    """
+
+    believed: float
+    bias_x: float
+    bias_y: float
+    tilt_variance: float
+    bias_variance: float
+    bias_variance_z: float
+    shared: float
+
+
 class FirstState(NamedTuple):
-    """What a lane starts with beside its settings' standard deviations: its place [m], attitude, accelerometer's bias
-    [m/s2], their variances, and whether nothing tells it the flow's scale. starts: false where it does not.
+    """What a lane starts with beside its settings' standard deviations: its place [m], attitude, accelerometer's bias,
+    their variances, and whether nothing tells it the flow's scale. starts: false where it does not.
     """
 
     starts: bool
     position: PositionNed
     attitude: Attitude
-    bias_x: float
-    bias_y: float
+    level: Levelling
     position_variance: float
-    tilt_variance: float
     heading_variance: float
-    bias_variance: float
     untold_scale: bool
 
 
@@ -178,21 +194,56 @@ def begin(work: Work, lanes: Lanes, lane: int, first: FirstState, p: Work) -> No
     store_attitude(work, lanes, lane, first.attitude)
     start_lag(work, lanes, lagged(lanes), lane, p[START_SIGMA + VELOCITY], load_flow_settings(p))
     store_position(work, lanes, lane, first.position)
-    store_biases(work, lanes, lane, Biases(0.0, 0.0, 0.0, first.bias_x, first.bias_y, 0.0))
+    level = first.level
+    store_biases(work, lanes, lane, Biases(0.0, 0.0, 0.0, level.bias_x, level.bias_y, 0.0))
     store_rate(work, lanes, lane, Rate(0.0, 0.0, 0.0))
     store_force(work, lanes, lane, Force(0.0, 0.0, 0.0))
     store_steady(work, lanes, lane, SteadyForce(0.0, 0.0, 0.0))
     for i in range(3):
         set_variance(work, lanes, POSITION + i, lane, first.position_variance)
-        set_variance(work, lanes, ATTITUDE + i, lane, first.heading_variance if i == 2 else first.tilt_variance)
-        set_variance(work, lanes, ACCEL_BIAS + i, lane, first.bias_variance)
+        set_variance(work, lanes, ATTITUDE + i, lane, first.heading_variance if i == 2 else level.tilt_variance)
+        set_variance(work, lanes, ACCEL_BIAS + i, lane, level.bias_variance_z if i == 2 else level.bias_variance)
+    tie_tilt(work, lanes, lane, rotation_by(first.attitude), level.shared)
     for fault in range(COUNT):
         begin_lane_anew(work, lanes, states_of(lanes), fault, lane)
     doubted = load_filter_settings(p).flow_scale_sigma if first.untold_scale else 0.0
     store_doubt(work, lanes, lane, ScaleDoubt(doubted))
 
 
+@equation
+def tie_tilt(work: Work, lanes: Lanes, lane: int, rotation: Rotation, shared: float) -> None:
+    """What is wrong of tilt and bias together: a force that was taken for a tilt is no bias.
+
+    By the law of motion dv' = theta x (R f) - R db, whose left side is 0 for a levelled vehicle and R f is -g.
+    """
+    for j in range(2):
+        set_covariance(work, lanes, ATTITUDE, ACCEL_BIAS + j, lane, shared * component(rotation[3:6], j))
+        set_covariance(work, lanes, ATTITUDE + 1, ACCEL_BIAS + j, lane, -shared * component(rotation[0:3], j))
+
+
 MEMORY.sink(FirstState, begin, "p")
+
+
+@equation
+def levelling(m: StartMemory, bias_sigma: float, read: bool, unknown: bool) -> Levelling:
+    """Tilt and accelerometer's bias by the mean specific force g theta + b + n of a vehicle that does not accelerate.
+
+    A tilt of STANDING_TILT_RAD and a bias, with what vibration makes of it, are expected; the noise n is what shakes
+    the readings, over their number. Where the heading is to be found, tilt (north, east) and bias (body) stay untied.
+    """
+    lasting, noise = squared(bias_sigma) + squared(RECTIFIED_SHARE) * m.shaken, m.shaken / larger(m.readings, 1.0)
+    tilted, doubt = squared(GRAVITY_M_S2 * STANDING_TILT_RAD), lasting + noise
+    believed, of_bias = tilted / (tilted + doubt), lasting / (tilted + doubt)
+    shaken = squared(bias_sigma) + m.shaken
+    return Levelling(
+        1.0 if read else believed,
+        0.0 if read else of_bias * m.force_x,
+        0.0 if read else of_bias * m.force_y,
+        squared(READ_TILT_RAD) if read else squared(STANDING_TILT_RAD) * (1.0 - believed) + squared(LEVELLED_FLOOR_RAD),
+        shaken if read else lasting * (1.0 - of_bias),
+        shaken,
+        0.0 if read or unknown else GRAVITY_M_S2 * squared(STANDING_TILT_RAD) * of_bias,
+    )
 
 
 @equation
@@ -223,13 +274,9 @@ def start_lanes(
     begins = starts(reading, m, t_s, sensor, fitted.deadline_s)
     at_fix = has_fix(reading, sensor)
     read, lost = bool(np.isfinite(m.attitude_s)), bool(np.isfinite(fitted.deadline_s))
-    doubt_m_s2 = np.sqrt(squared(bias_sigma) + m.shaken)
-    believed = squared(STANDING_TILT_RAD) / (squared(STANDING_TILT_RAD) + squared(doubt_m_s2 / GRAVITY_M_S2))
-    w, x, y, z = (m.qw, m.qx, m.qy, m.qz) if read else level(m, believed, heading.field_rad, fitted)
-    rotation = rotation_from_quaternion(w, x, y, z)
-    levels = not read and m.readings >= LEAST_LEVELLING
-    tilt = READ_TILT_RAD if read else STANDING_TILT_RAD * np.sqrt(1.0 - believed) + LEVELLED_FLOOR_RAD
     unknown = fitted.heading == NO_HEADING and lost and not read
+    levels = levelling(m, bias_sigma, read, unknown)
+    w, x, y, z = (m.qw, m.qx, m.qy, m.qz) if read else level(m, levels.believed, heading.field_rad, fitted)
     turned = heading_sigma(read, lost, unknown, heading.field_rad, fitted.heading)
     spread = LOST_SIGMA_M if lost else ORIGIN_SIGMA_M
     fix = PositionNed(reading.value_0, reading.value_1, reading.value_2)
@@ -238,12 +285,9 @@ def start_lanes(
             begins,
             fix if at_fix else PositionNed(0.0, 0.0, 0.0),
             Attitude(w, x, y, z),
-            m.force_x + GRAVITY_M_S2 * rotation[6] if levels else 0.0,
-            m.force_y + GRAVITY_M_S2 * rotation[7] if levels else 0.0,
+            levels,
             spread * spread,
-            tilt * tilt,
             turned * turned,
-            doubt_m_s2 * doubt_m_s2,
             not lost,
         ),
         with_started(m, started=1.0 if begins else m.started),

@@ -38,7 +38,8 @@ COMPASS_HEADING_RAD = 0.3  # a raw magnetometer's: twice the usual hard iron (co
 DATUM_HEADING_RAD = 1e-3  # the start defines the frame
 UNTOLD_HEADING_RAD = 1.0  # the first heading that is told will, 0.5 rad off (test_an_external_heading_is_taken)
 LEAST_LEVELLING, MOST_LEVELLING = 5.0, 100.0  # readings whose mean is level: 0.1 to 2 s at 50 Hz
-LEVELLING_S = 1.0  # and for so long: of 24 Hz of 1.5 m/s2 are left 0.1 m/s2, 0.6 deg; five readings leave 5 deg
+LEVELLED_M_S2, LEVELLING_S = 0.1, 1.0  # so sure a mean will do (0.6 deg); of a shaken vehicle's a second's is waited for
+HOVERING_M_S2 = 0.1  # how a vehicle may accelerate over that second: chosen; gusts, and one that starts on its way
 RECTIFIED_SHARE = 0.1  # of what shakes an accelerometer lasts in its mean: chosen; 1 is the false roll of `landing`
 
 with_force = replacing(StartMemory, "force_x", "force_y", "force_z", "readings", "shaken", "since_s")
@@ -80,6 +81,12 @@ def levelled(reading: Reading, m: StartMemory, t_s: float) -> StartMemory:
         shaken=m.shaken + share * (square - m.shaken),
         since_s=m.since_s if m.readings > 0.0 else t_s,
     )
+
+
+@equation
+def noise_of_mean(m: StartMemory) -> float:
+    """The variance of the mean specific force about gravity's, of readings shaken each by itself [m2/s4]."""
+    return squared(HOVERING_M_S2) + m.shaken / larger(m.readings, 1.0)
 
 
 @on_lanes
@@ -143,7 +150,8 @@ def starts(reading: Reading, m: StartMemory, t_s: float, sensor: int, deadline_s
     """Whether a lane whose attitude is known starts: at a fix, or at the local origin with the first flow, pose or word
     that the vehicle stands, where no fix came in time.
     """
-    levels = m.readings >= LEAST_LEVELLING and t_s - m.since_s >= LEVELLING_S
+    sure = m.shaken <= m.readings * squared(LEVELLED_M_S2) or t_s - m.since_s >= LEVELLING_S
+    levels = m.readings >= LEAST_LEVELLING and sure
     waiting = m.started == 0.0 and (bool(np.isfinite(m.attitude_s)) or levels)
     other = sensor == Sensor.FLOW_RATE or sensor == Sensor.FLOW_VELOCITY or sensor == Sensor.POSE
     stands = sensor == Sensor.LANDED and reading.value_0 > ON_GROUND
@@ -231,8 +239,8 @@ def levelling(m: StartMemory, bias_sigma: float, read: bool, unknown: bool) -> L
     A tilt of STANDING_TILT_RAD and a bias, with what vibration makes of it, are expected; the noise n is what shakes
     the readings, over their number. Where the heading is to be found, tilt (north, east) and bias (body) stay untied.
     """
-    lasting, noise = squared(bias_sigma) + squared(RECTIFIED_SHARE) * m.shaken, m.shaken / larger(m.readings, 1.0)
-    tilted, doubt = squared(GRAVITY_M_S2 * STANDING_TILT_RAD), lasting + noise
+    lasting = squared(bias_sigma) + squared(RECTIFIED_SHARE) * m.shaken
+    tilted, doubt = squared(GRAVITY_M_S2 * STANDING_TILT_RAD), lasting + noise_of_mean(m)
     believed, of_bias = tilted / (tilted + doubt), lasting / (tilted + doubt)
     shaken = squared(bias_sigma) + m.shaken
     return Levelling(

@@ -48,7 +48,8 @@ EXAMPLES = settings(max_examples=4, deadline=None)
 
 def advance(filter_: Filter, numbers: FilterSettings, lag: FlowLag) -> None:
     """One step of a filter that carries the dynamics."""
-    filter_.work[[ACCEL_NOISE, GYRO_NOISE]] = numbers.accel_noise_m_s2_rt_hz**2, numbers.gyro_noise_rad_s_rt_hz**2
+    filter_.work[ACCEL_NOISE : ACCEL_NOISE + 2] = numbers.accel_noise_m_s2_rt_hz**2
+    filter_.work[GYRO_NOISE] = numbers.gyro_noise_rad_s_rt_hz**2
     lag_starts(filter_.work, ONE_LANE, lag)
     predict(filter_.work, ONE_LANE, STATES_WITH_LAG, EPOCH_S, numbers)
     lag_ends(filter_.work, ONE_LANE, lag)

@@ -56,7 +56,8 @@ EXAMPLES = settings(max_examples=8, deadline=None)
 
 
 def advance(filter_: Filter, dt_s: float, numbers: FilterSettings = SILENT, n: int = N) -> None:
-    filter_.work[[ACCEL_NOISE, GYRO_NOISE]] = numbers.accel_noise_m_s2_rt_hz**2, numbers.gyro_noise_rad_s_rt_hz**2
+    filter_.work[ACCEL_NOISE : ACCEL_NOISE + 2] = numbers.accel_noise_m_s2_rt_hz**2
+    filter_.work[GYRO_NOISE] = numbers.gyro_noise_rad_s_rt_hz**2
     predict(filter_.work, ONE_LANE, n, dt_s, numbers)
 
 

@@ -267,7 +267,8 @@ def filter_at(seed: int, roll: float, pitch: float, yaw: float, height_m: float)
     filter_.rows(IMU, 6)[:] = random.normal([0, 0, 0, 0, 0, -9.8], [0.5, 0.5, 0.5, 2, 2, 2])
     filter_.rows(RATE, 3)[:] = random.normal(0.0, 0.5, 3)
     filter_.rows(FORCE, 3)[:] = random.normal([0, 0, -9.8], 2.0)
-    filter_.work[[ACCEL_NOISE, GYRO_NOISE]] = SETTINGS.accel_noise_m_s2_rt_hz**2, SETTINGS.gyro_noise_rad_s_rt_hz**2
+    filter_.work[ACCEL_NOISE : ACCEL_NOISE + 2] = SETTINGS.accel_noise_m_s2_rt_hz**2
+    filter_.work[GYRO_NOISE] = SETTINGS.gyro_noise_rad_s_rt_hz**2
     filter_.reading[:] = random.normal(size=8)
     return filter_
 

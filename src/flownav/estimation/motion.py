@@ -199,7 +199,7 @@ def add_motion_noise(work: Work, lanes: Lanes, dt_s: float, position_walk_m_rt_s
     for axis in range(3):
         add_noise(work, lanes, POSITION + axis, position_walk_m_rt_s * position_walk_m_rt_s * dt_s)
         for lane in range(len(lanes)):
-            noise = dt_s * work[ACCEL_NOISE * len(lanes) + lane]
+            noise = dt_s * work[(ACCEL_NOISE + axis // 2) * len(lanes) + lane]
             work[at(VELOCITY + axis, VELOCITY + axis) * len(lanes) + lane] += noise
         for lane in range(len(lanes)):
             noise = dt_s * work[GYRO_NOISE * len(lanes) + lane]

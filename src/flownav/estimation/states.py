@@ -91,7 +91,7 @@ IMU = _rows.take(6)  # gyro [rad/s] and specific force [m/s2], body FRD, that mo
 RATE = _rows.take(3)  # body rate in the last step, the gyro's bias taken off [rad/s]
 FORCE = _rows.take(3)  # specific force in the last step, bias off, earth NED [m/s2]
 MIDDLE = _rows.take(9)  # R_EB in the middle of the last step, row by row
-ACCEL_NOISE = _rows.take(1)  # white noise of the specific force in this lane, variance density [(m/s2)^2/Hz]
+ACCEL_NOISE = _rows.take(2)  # white noise of the specific force in this lane, level and down, density [(m/s2)^2/Hz]
 GYRO_NOISE = _rows.take(1)  # and of the body rate [(rad/s)^2/Hz]
 # the observation at hand
 MEASURED = _rows.take(8)  # what was read

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.core.compile import equation, replacing
+from flownav.core.compile import equation, larger, replacing
 from flownav.navigation.motion_records import ImuMemory, MotionMemory, MotionStep, OwedMotion, SpentMotion, SteadyForce
 from flownav.navigation.records import Reading, StartMemory
 from flownav.navigation.tape import IMU_LOST
@@ -119,7 +119,9 @@ def judge_motion(
     x = paid(between[3], held[3], spent.accel_x, owed.accel_x, step_s, period_s, now, moving)
     y = paid(between[4], held[4], spent.accel_y, owed.accel_y, step_s, period_s, now, moving)
     z = paid(between[5], held[5], spent.accel_z, owed.accel_z, step_s, period_s, now, moving)
-    accel = doubt.level * s.accel_noise_m_s2_rt_hz if moving else s.coasting_accel_m_s2_rt_hz
+    told, told_down = s.accel_noise_m_s2_rt_hz, s.accel_noise_m_s2_rt_hz * s.accel_noise_down_share
+    accel = doubt.level * told if moving else s.coasting_accel_m_s2_rt_hz
+    accel_down = larger(doubt.level, doubt.down) * told_down if moving else s.coasting_accel_m_s2_rt_hz
     gyro = s.gyro_noise_rad_s_rt_hz if moving else s.coasting_rate_rad_s_rt_hz
     return StepMotion(
         MotionStep(1.0 if moving else 0.0),
@@ -133,7 +135,7 @@ def judge_motion(
             SpentMotion(p.spent, q.spent, r.spent, x.spent, y.spent, z.spent),
             OwedMotion(p.owed, q.owed, r.owed, x.owed, y.owed, z.owed),
         ),
-        MotionNoise(accel * accel, gyro * gyro),
+        MotionNoise(accel * accel, accel_down * accel_down, gyro * gyro),
         Event(IMU_LOST if loses else -1, period_s),
     )
 

@@ -48,6 +48,9 @@ class NavigatorSettingsFile(ParameterModel):
         le=50,
         description="accelerometer noise with vibration; PX4's 0.35 m/s2 at 8 ms is 0.03",
     )
+    accel_noise_down_share: Number = Field(
+        1.0, gt=0, le=10, description="of that noise, of the vertical: a rotor shakes level more than down"
+    )
     gyro_noise_rad_s_rt_hz: Number = Field(
         0.004, gt=0, le=5, description="gyro noise with vibration and sampling; PX4's 0.015 rad/s at 8 ms is 0.0013"
     )

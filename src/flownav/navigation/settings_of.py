@@ -25,7 +25,7 @@ ABOVE_FLOOR_M = 0.01  # a step of the shipped lidar: a rangefinder that reads it
 LEAST_SHARE = 0.05  # of a stated accuracy, where the sheet says what changes from fix to fix: chosen, not measured
 BIAS_LIMIT_SIGMAS = 3.0  # a limit leaves room for all but 3 in 1000 units; chosen
 VIBRATION_MARGIN = 2.0  # chosen, not measured: what is beyond twice the stated vibration, the sheet does not know
-AIDED_HZ = 2.0  # chosen, not measured: slower motion is held by what aids the IMU
+AIDED_HZ = 4.0  # chosen, not measured: slower motion is held by what aids the IMU
 WASH_LASTS_S = 3.0  # chosen, not measured: how long a rotor's wash deceives a barometer
 CLIMB_M_S = 1.0  # chosen: a lag errs by its length in a descent at this speed
 
@@ -136,7 +136,7 @@ def of_inertial(sheet: InertialSheet, rotor_hz: tuple[float, float] | None = Non
     it counts by AIDED_HZ/f.
     """
     gyro, accel, rt_period_s = sheet.gyro, sheet.accelerometer, math.sqrt(sheet.period_s)
-    shaken_m_s2 = max(_shaken(sheet, "level_m_s2", rotor_hz), _shaken(sheet, "vertical_m_s2", rotor_hz))
+    level_m_s2, down_m_s2 = (_shaken(sheet, part, rotor_hz) for part in ("level_m_s2", "vertical_m_s2"))
     jumping_m_s2 = max(
         _shaken(sheet, "level_m_s2", rotor_hz, whole=True), _shaken(sheet, "vertical_m_s2", rotor_hz, whole=True)
     )
@@ -148,8 +148,10 @@ def of_inertial(sheet: InertialSheet, rotor_hz: tuple[float, float] | None = Non
     accel_bias = math.hypot(mg * accel.bias_mg, by_weight * GRAVITY_M_S2)
     gyro_bias = math.radians(math.hypot(gyro.bias_deg_s, gyro.g_sensitivity_deg_s_g))
     usual = NavigatorSettingsFile()
+    level, down = (math.hypot(accel_white, shaken_m_s2 * rt_period_s) for shaken_m_s2 in (level_m_s2, down_m_s2))
     return {
-        "accel_noise_m_s2_rt_hz": math.hypot(accel_white, shaken_m_s2 * rt_period_s),
+        "accel_noise_m_s2_rt_hz": level,
+        "accel_noise_down_share": down / level,
         "gyro_noise_rad_s_rt_hz": math.hypot(gyro_white, turning_rad_s * rt_period_s),
         "accel_walk_m_s2_rt_s": mg * accel.walk_mg_rts,
         "gyro_walk_rad_s_rt_s": math.radians(gyro.walk_deg_s_rts),
@@ -185,13 +187,14 @@ def _harm(tone_hz: float, rate_hz: float) -> float:
 def of_gps_receiver(sheet: GpsReceiverSheet) -> Keys:
     """The receiver's errors as its sheet splits them, so that little is left for what it states of each fix."""
     position, velocity = sheet.position, sheet.velocity
+    rms = math.exp(2.0 * position.spread * position.spread)
     step_m, step_m_s = position.quantum_m / math.sqrt(12.0), velocity.quantum_m_s / math.sqrt(12.0)
     return {
-        "gps_slow_sigma_m": position.slow_sigma_m,
-        "gps_slow_sigma_down_m": position.slow_sigma_down_m,
+        "gps_slow_sigma_m": rms * position.slow_sigma_m,
+        "gps_slow_sigma_down_m": rms * position.slow_sigma_down_m,
         "gps_slow_tau_s": max(position.slow_tau_s, sheet.period_s),
-        "gps_fast_sigma_m": position.fast_sigma_m,
-        "gps_fast_sigma_down_m": position.fast_sigma_down_m,
+        "gps_fast_sigma_m": rms * position.fast_sigma_m,
+        "gps_fast_sigma_down_m": rms * position.fast_sigma_down_m,
         "gps_fast_tau_s": max(position.fast_tau_s, sheet.period_s),
         "gps_white_sigma_m": max(math.hypot(position.white_sigma_m, step_m), 1e-3),
         "gps_white_sigma_down_m": max(math.hypot(position.white_sigma_down_m, step_m), 1e-3),

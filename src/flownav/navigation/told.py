@@ -144,6 +144,7 @@ class ImuSettings(NamedTuple):
     """The inertial sensors: noise with them and without, what vibration does, when a reading is stale."""
 
     accel_noise_m_s2_rt_hz: float
+    accel_noise_down_share: float
     gyro_noise_rad_s_rt_hz: float
     accel_walk_m_s2_rt_s: float
     coasting_accel_m_s2_rt_hz: float

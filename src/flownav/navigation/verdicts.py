@@ -71,9 +71,10 @@ class AppliedMotion(NamedTuple):
 
 
 class MotionNoise(NamedTuple):
-    """White noise of what moves the filter: variance densities [(m/s2)^2/Hz], [(rad/s)^2/Hz]."""
+    """White noise of what moves the filter: densities level and down [(m/s2)^2/Hz], and of turning [(rad/s)^2/Hz]."""
 
     accel: float
+    accel_down: float
     gyro: float
 
 
@@ -267,7 +268,7 @@ def doubt(work: Work, lanes: Lanes, lane: int, given: Doubt) -> None:
 MEMORY.name(Biases, *(STATE + GYRO_BIAS + i for i in range(3)), *(STATE + ACCEL_BIAS + i for i in range(3)))
 MEMORY.name(Force, *(FORCE + i for i in range(3)))
 MEMORY.name(AppliedMotion, *(IMU + i for i in range(6)))
-MEMORY.name(MotionNoise, ACCEL_NOISE, GYRO_NOISE)
+MEMORY.name(MotionNoise, ACCEL_NOISE, ACCEL_NOISE + 1, GYRO_NOISE)
 MEMORY.name(Observation, OBSERVATION)
 MEMORY.name(Accepted, ACCEPTED)
 MEMORY.name(Tested, REASON, INNOVATION, INNOVATION_VARIANCE, NOISE)

@@ -75,7 +75,7 @@ class Shaken(NamedTuple):
     """What vibration does over a step."""
 
     imu: ImuMemory
-    doubts: tuple[Doubt, Doubt, Doubt, Doubt, Doubt, Doubt, Doubt, Doubt, Doubt, Doubt]
+    doubts: tuple[Doubt, Doubt, Doubt, Doubt, Doubt, Doubt, Doubt, Doubt, Doubt]
 
 
 @on_lanes
@@ -90,7 +90,6 @@ def add_vibration_noise(m: ImuMemory, step: MotionStep, factor: AccelFactors, *,
     level = s.vibration_walk_per_rt_s * beyond
     down = s.vibration_walk_per_rt_s * larger(beyond, doubt)
     shaken = m.vibration * moved_s * moved_s if beyond > 0.0 else 0.0
-    told = s.accel_noise_m_s2_rt_hz * s.accel_noise_m_s2_rt_hz
     walk, walk_down = FREED_WALK_M_S2_RT_S * (factor.level - 1.0), FREED_WALK_M_S2_RT_S * (factor.down - 1.0)
     return Shaken(
         with_doubt(m, doubt_m_s2=doubt),
@@ -98,7 +97,6 @@ def add_vibration_noise(m: ImuMemory, step: MotionStep, factor: AccelFactors, *,
             Doubt(ACCEL_BIAS, walk * walk * moved_s),
             Doubt(ACCEL_BIAS + 1, walk * walk * moved_s),
             Doubt(ACCEL_BIAS + 2, walk_down * walk_down * moved_s),
-            Doubt(VELOCITY + 2, larger(factor.down * factor.down - factor.level * factor.level, 0.0) * told * moved_s),
             Doubt(ACCEL_BIAS, level * level * moved_s),
             Doubt(ACCEL_BIAS + 1, level * level * moved_s),
             Doubt(ACCEL_BIAS + 2, down * down * moved_s),

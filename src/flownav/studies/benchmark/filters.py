@@ -30,10 +30,8 @@ def standing(lanes: Lanes, n: int = states.STATES) -> Array:
     rows[states.QUATERNION] = rows[states.OFFERED] = rows[states.INNOVATION_VARIANCE] = 1.0
     rows[states.IMU + 5] = -GRAVITY_M_S2
     rows[states.STATE + states.POSITION + 2] = -5.0
-    rows[states.ACCEL_NOISE], rows[states.GYRO_NOISE] = (
-        SETTINGS.accel_noise_m_s2_rt_hz**2,
-        SETTINGS.gyro_noise_rad_s_rt_hz**2,
-    )
+    rows[states.ACCEL_NOISE : states.ACCEL_NOISE + 2] = SETTINGS.accel_noise_m_s2_rt_hz**2
+    rows[states.GYRO_NOISE] = SETTINGS.gyro_noise_rad_s_rt_hz**2
     for i in range(n):
         rows[at(i, i)] = 0.01
     rows[states.OBSERVED : states.OBSERVED + 11] = np.array([10, 3, 4, 5, 6, 7, 8, 29, 2, 27, 9])[

@@ -11,6 +11,7 @@ from flownav.estimation.states import GROUND
 from flownav.navigation.motion_records import ImuMemory
 from flownav.navigation.offers import conclude, fuse_offered, weigh_strays
 from flownav.navigation.packed import load_height_settings
+from flownav.navigation.place import ON_GROUND
 from flownav.navigation.reasons import (
     DATUM,
     FUSED,
@@ -244,7 +245,7 @@ def judge_refusal(
     """After the test: a range that is refused first makes the accelerometer doubted, then the ground new.
 
     A streak of refusals ends where the sensor says something else. The ground is found anew where ranges agree on it
-    for long, and where they do not, its candidate is followed.
+    for long, and where they do not, its candidate is followed; a vehicle that stands stands on the ground it has.
     """
     m, echo, g = memory
     fused, refused = tested.reason == FUSED, tested.reason == INNOVATION_GATE
@@ -257,7 +258,7 @@ def judge_refusal(
     by_m = tested.innovation if doubts else 0.0
     imu_after, doubt_event, freed = doubted_imu(by_m, doubts, imu)  # once: at each, a short echo would be believed too
     sought = sought_ground(reading, t_s, height, False, g, GROUND_RESET, s)
-    seeks = refused and g.known > 0.0 and not strays
+    seeks = refused and g.known > 0.0 and not strays and aid.landed <= ON_GROUND
     again = seeks and lasting_s >= s.ground_reset_s and sought.found
     waits = seeks and (lasting_s < s.ground_reset_s or not sought.found)
     ends = fused or tested.reason == OUT_OF_RANGE

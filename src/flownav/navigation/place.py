@@ -34,8 +34,9 @@ MANY_STRAYS = 6.0
 ON_GROUND = 0.5  # between 0 and 1
 STANDING_SIGMA_M = 0.005  # chosen, not measured: how skids settle
 CARRIED_M = 0.1  # chosen, not measured; 0.05 m stays and 0.15 m goes along (test_fates)
-# how the pad is known: the vehicle stands on it before its flight, has left it, has seen it
-STOOD_ON, LEFT, SEEN = 1.0, 2.0, 3.0
+# how the pad is known: not, of a vehicle that flies and stood on none; it stands on it before its flight, has left it,
+# has seen it
+NEVER_STOOD, STOOD_ON, LEFT, SEEN = -1.0, 1.0, 2.0, 3.0
 
 with_landed = replacing(AidMemory, "landed")
 with_known = replacing(PadMemory, "known")
@@ -211,7 +212,7 @@ class Standing(NamedTuple):
 def stand_on_pad(reading: Reading, start: StartMemory, position: PositionNed, pad: Pad, m: PadMemory) -> Standing:
     """The place of take-off is the pad until a camera sees one: a state tied to the vehicle's own while it stands, so
     that what GPS later tells of the one it tells of the other, and the way back is known better than either. A
-    vehicle that is carried about before its flight takes the pad along.
+    vehicle that is carried about before its flight takes the pad along; one that has flown lands where it lands.
     """
     sound = usable(reading, reading.value_0, 0.0, start.started) == FUSED
     landed = sound and reading.value_0 > ON_GROUND
@@ -219,7 +220,8 @@ def stand_on_pad(reading: Reading, start: StartMemory, position: PositionNed, pa
     carried = m.known == STOOD_ON and off_n * off_n + off_e * off_e > CARRIED_M * CARRIED_M
     anew = landed and (m.known == 0.0 or carried)
     known = STOOD_ON if anew else m.known
-    known = LEFT if sound and not landed and known == STOOD_ON else known
+    leaves = sound and not landed
+    known = LEFT if leaves and known == STOOD_ON else (NEVER_STOOD if leaves and known == 0.0 else known)
     return Standing(
         with_known(m, known=known),
         pad_at(position.pos_n, position.pos_e, position.pos_d, anew),

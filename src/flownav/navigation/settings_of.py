@@ -25,7 +25,7 @@ ABOVE_FLOOR_M = 0.01  # a step of the shipped lidar: a rangefinder that reads it
 LEAST_SHARE = 0.05  # of a stated accuracy, where the sheet says what changes from fix to fix: chosen, not measured
 BIAS_LIMIT_SIGMAS = 3.0  # a limit leaves room for all but 3 in 1000 units; chosen
 VIBRATION_MARGIN = 2.0  # chosen, not measured: what is beyond twice the stated vibration, the sheet does not know
-AIDED_HZ = 4.0  # chosen, not measured: slower motion is held by what aids the IMU
+AIDED_HZ = 3.0  # chosen, not measured: slower motion is held by what aids the IMU
 WASH_LASTS_S = 3.0  # chosen, not measured: how long a rotor's wash deceives a barometer
 CLIMB_M_S = 1.0  # chosen: a lag errs by its length in a descent at this speed
 
@@ -187,7 +187,7 @@ def _harm(tone_hz: float, rate_hz: float) -> float:
 def of_gps_receiver(sheet: GpsReceiverSheet) -> Keys:
     """The receiver's errors as its sheet splits them, so that little is left for what it states of each fix."""
     position, velocity = sheet.position, sheet.velocity
-    rms = math.exp(2.0 * position.spread * position.spread)
+    rms = math.exp(1.5 * position.spread * position.spread)
     step_m, step_m_s = position.quantum_m / math.sqrt(12.0), velocity.quantum_m_s / math.sqrt(12.0)
     return {
         "gps_slow_sigma_m": rms * position.slow_sigma_m,
@@ -199,12 +199,12 @@ def of_gps_receiver(sheet: GpsReceiverSheet) -> Keys:
         "gps_white_sigma_m": max(math.hypot(position.white_sigma_m, step_m), 1e-3),
         "gps_white_sigma_down_m": max(math.hypot(position.white_sigma_down_m, step_m), 1e-3),
         "gps_white_share": LEAST_SHARE,
-        "gps_velocity_sigma_m_s": velocity.sigma_m_s,
-        "gps_velocity_sigma_down_m_s": velocity.sigma_down_m_s,
+        "gps_velocity_sigma_m_s": rms * velocity.sigma_m_s,
+        "gps_velocity_sigma_down_m_s": rms * velocity.sigma_down_m_s,
         "gps_velocity_tau_s": max(velocity.tau_s, sheet.period_s),
         "gps_velocity_white_m_s": max(math.hypot(velocity.white_m_s, step_m_s), 1e-3),
         "gps_velocity_white_down_m_s": max(math.hypot(velocity.white_down_m_s, step_m_s), 1e-3),
-        "gps_velocity_lag_sigma_s": velocity.smoothing_tau_s,
+        "gps_velocity_lag_sigma_s": 2.0 * velocity.smoothing_tau_s,
         "gps_forward_m": sheet.antenna.forward_m,
         "gps_right_m": sheet.antenna.right_m,
         "gps_below_m": sheet.antenna.down_m,

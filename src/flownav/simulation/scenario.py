@@ -20,7 +20,7 @@ from flownav.simulation.ground import GroundSettings, RecirculationSettings
 from flownav.simulation.wind import WindSettings
 from flownav.vehicle.kinds import SHIPPED_NAMES
 
-SHIPPED = ("takeoff", "landing", "gusty", "pad_return", "approach")
+SHIPPED = ("takeoff", "landing", "gusty", "pad_return", "approach", "sortie")
 
 
 class Knot(ParameterModel):

@@ -17,6 +17,7 @@ from flownav.navigation.motion_records import CourseMemory, PushMemory
 from flownav.navigation.offers import note_aid, note_aid_age, note_height
 from flownav.navigation.place import (
     LEFT,
+    NEVER_STOOD,
     MANY_STRAYS,
     SEEN,
     STOOD_ON,
@@ -200,7 +201,8 @@ def test_a_whole_fix_ends_the_count_and_half_of_one_does_not():
 
 @pytest.mark.parametrize(("known", "off_m", "landed", "after", "moves", "stands"), [
     (0.0, 5.0, 1.0, STOOD_ON, True, True),
-    (0.0, 5.0, 0.0, 0.0, False, False),
+    (0.0, 5.0, 0.0, NEVER_STOOD, False, False),
+    (NEVER_STOOD, 5.0, 1.0, NEVER_STOOD, False, False),  # where it lands is no pad
     (STOOD_ON, 0.05, 1.0, STOOD_ON, False, True),
     (STOOD_ON, 0.15, 1.0, STOOD_ON, True, True),  # carried about
     (STOOD_ON, 0.15, 0.0, LEFT, False, False),

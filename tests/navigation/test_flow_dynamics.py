@@ -57,9 +57,9 @@ SEED = 5
 SETTLED = 500  # epochs
 # m/s (docs/explanation/landing-filter.md): sixteen gusty landings, at the horizon and flown on, with delay or states
 IN_LANDINGS = {
-    "2 Hz, damping 0.7": ((0.0297, 0.0326), (0.0318, 0.0355)),
-    "2 Hz, damping 1.5": ((0.0336, 0.0349), (0.0330, 0.0367)),
-    "0.5 Hz, damping 0.7": ((0.0385, 0.0451), (0.0346, 0.0383)),
+    "2 Hz, damping 0.7": ((0.0282, 0.0307), (0.0298, 0.0331)),
+    "2 Hz, damping 1.5": ((0.0312, 0.0312), (0.0305, 0.0339)),
+    "0.5 Hz, damping 0.7": ((0.0356, 0.0405), (0.0316, 0.0349)),
 }
 SENSORS = {"2 Hz, damping 0.7": (2.0, 0.7), "2 Hz, damping 1.5": (2.0, 1.5), "0.5 Hz, damping 0.7": (0.5, 0.7)}
 

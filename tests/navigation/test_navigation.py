@@ -16,7 +16,7 @@ GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
 
 
 def test_it_starts_level_from_the_accelerometer_alone():
-    """As far as vehicles stand aslant (0.07 rad), beside what the accelerometer's bias (0.2 m/s2) would look like."""
+    """As far as vehicles stand aslant (0.1 rad), beside a bias (0.2 m/s2) and a hover (0.1 m/s2)."""
     flown = fly(still, 3.0).without(Sensor.ATTITUDE, Sensor.MAG)
     roll, pitch = 0.1, -0.06  # it stands on a slope
     imu = flown.streams[Sensor.IMU].value.copy()
@@ -28,12 +28,14 @@ def test_it_starts_level_from_the_accelerometer_alone():
         flown = flown.cut(sensor, 0.0, 0.5)
     run = navigate(flown)
     w, x, y, _ = run.said.quaternion[0]
-    believed = 0.07**2 / (0.07**2 + (0.2 / GRAVITY_M_S2) ** 2)
+    tilted, lasting, noise = (0.1 * GRAVITY_M_S2) ** 2, 0.2**2, 0.1**2
+    believed = tilted / (tilted + lasting + noise)
     assert believed > 0.9
     assert 2 * np.arctan2(x, w) == pytest.approx(believed * roll, abs=1e-3)
     assert 2 * np.arctan2(y, w) == pytest.approx(believed * pitch, abs=1e-3)
-    left_x, left_y = run.column(ACCEL_BIAS, 2)[0] / GRAVITY_M_S2  # the rest is taken for the accelerometer's
-    assert [left_x, left_y] == pytest.approx([(1 - believed) * pitch, -(1 - believed) * roll], abs=1e-3)
+    left_x, left_y = run.column(ACCEL_BIAS, 2)[0] / GRAVITY_M_S2  # of the rest the lasting part is the accelerometer's
+    biased = lasting / (tilted + lasting + noise)
+    assert [left_x, left_y] == pytest.approx([biased * pitch, -biased * roll], abs=1e-3)
     assert np.abs(run.velocity_error).max() < 0.02
     assert run.events("filter", "start")[:, 1] == pytest.approx([1.0])
 

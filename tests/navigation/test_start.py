@@ -7,11 +7,26 @@ import math
 import numpy as np
 import pytest
 
-from flownav.core.frames import GRAVITY_M_S2
+from filters import SILENT, Filter, N
+from flownav.core.compile import ONE_LANE
+from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler, rotation_from_quaternion
 from flownav.core.measurement import Sensor
-from flownav.estimation.states import ACCEL_BIAS, GYRO_BIAS
+from flownav.estimation.motion import predict
+from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, IMU, VELOCITY
 from flownav.navigation.records import Reading, StartMemory
-from flownav.navigation.start import STANDING_TILT_RAD, level, levelled
+from flownav.navigation.start import (
+    HOVERING_M_S2,
+    LEVELLED_FLOOR_RAD,
+    LEVELLING_S,
+    RECTIFIED_SHARE,
+    STANDING_TILT_RAD,
+    level,
+    levelled,
+    levelling,
+    noise_of_mean,
+    starts,
+    tie_tilt,
+)
 from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
 from navigation_streams import Navigated, fly, navigate, still
 
@@ -27,8 +42,8 @@ def force_of(roll: float, pitch: float) -> tuple[float, float, float]:
     return g * math.sin(pitch), -g * math.sin(roll) * math.cos(pitch), -g * math.cos(roll) * math.cos(pitch)
 
 
-def heard(force: tuple[float, ...], m: StartMemory) -> StartMemory:
-    return levelled(Reading(0.0, 0.0, 0.0, *force, NAN, NAN, NAN, 255.0, 1.0, 0.0), m)
+def heard(force: tuple[float, ...], m: StartMemory, t_s: float = 0.0) -> StartMemory:
+    return levelled(Reading(0.0, 0.0, 0.0, *force, NAN, NAN, NAN, 255.0, 1.0, 0.0), m, t_s)
 
 
 def angles(q: tuple[float, ...]) -> tuple[float, float, float]:
@@ -87,34 +102,82 @@ def test_the_first_heading_is_true_north_by_field_and_declination(field_rad, dec
 # -- a lane's start ------------------------------------------------------------------------------------------
 def started(shaking_m_s2: float, roll: float) -> Navigated:
     """A vehicle on a slope, shaken by so much; flow begins after half a second."""
-    flown = fly(still, 0.6).only(Sensor.IMU, Sensor.FLOW_RATE, Sensor.RANGE)
+    flown = fly(still, 1.6).only(Sensor.IMU, Sensor.FLOW_RATE, Sensor.RANGE)
     imu = flown.streams[Sensor.IMU].value.copy()
     imu[:, 3:] = force_of(roll, 0.0)
     imu[:, 3:] += shaking_m_s2 * np.where(np.arange(len(imu)) % 2 == 0, 1.0, -1.0)[:, None]  # its mean is exact
     return navigate(flown.changed(Sensor.IMU, value=imu).cut(Sensor.FLOW_RATE, 0.0, 0.5).without(Sensor.RANGE))
 
 
-def believed_of(shaking_m_s2: float) -> float:
-    doubt = 0.2**2 + shaking_m_s2**2  # `accel_bias_sigma_m_s2`
-    return STANDING_TILT_RAD**2 / (STANDING_TILT_RAD**2 + doubt / GRAVITY_M_S2**2)
+def doubts_of(shaking_m_s2: float, readings: int) -> tuple[float, float]:
+    """The variance of what lasts in a mean force and of what its readings leave [m2/s4]."""
+    lasting = 0.2**2 + (RECTIFIED_SHARE * shaking_m_s2) ** 2  # `accel_bias_sigma_m_s2`
+    return lasting, HOVERING_M_S2**2 + shaking_m_s2**2 / readings
 
 
 @pytest.mark.parametrize("shaking_m_s2", [0.0, 0.5, 3.0])
-def test_a_shaken_vehicle_takes_itself_for_level_and_its_force_for_a_bias(shaking_m_s2):
+def test_the_start_is_the_posterior_of_a_tilt_a_bias_and_a_noise(shaking_m_s2):
+    """Of one axis: z = g theta + b + n, by the joint normal law, as if by a Kalman filter of two states."""
+    m = EMPTY._replace(force_x=0.7, readings=50.0, shaken=shaking_m_s2**2)
+    lasting, noise = doubts_of(shaking_m_s2, 50)
+    prior = np.diag([STANDING_TILT_RAD**2, lasting])
+    jacobian = np.array([GRAVITY_M_S2, 1.0])
+    cross = prior @ jacobian
+    total = jacobian @ cross + noise
+    mean, after = cross / total * 0.7, prior - np.outer(cross, cross) / total
+    found = levelling(m, 0.2, False, False)
+    assert found.believed * 0.7 / GRAVITY_M_S2 == pytest.approx(mean[0], rel=1e-12)
+    assert found.bias_x == pytest.approx(mean[1], rel=1e-12)
+    assert found.bias_variance == pytest.approx(after[1, 1], rel=1e-12)
+    assert found.shared == pytest.approx(-after[0, 1], rel=1e-12)
+    assert found.tilt_variance == pytest.approx(after[0, 0] + LEVELLED_FLOOR_RAD**2, rel=1e-12)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.9, math.pi, -2.0])
+def test_a_levelled_vehicle_knows_its_acceleration_better_than_its_tilt_or_its_bias(yaw):
+    """Tilt and bias are tied by the signs with which both enter the motion, however the vehicle heads."""
+    found = levelling(EMPTY._replace(readings=100.0), 0.2, False, False)
+    filter_ = Filter()
+    filter_.q[:] = quaternion_from_euler(0.0, 0.0, yaw)
+    filter_.rows(IMU, 6)[5] = -GRAVITY_M_S2
+    spread = np.zeros((N, N))
+    spread[range(ATTITUDE, ATTITUDE + 2), range(ATTITUDE, ATTITUDE + 2)] = found.tilt_variance
+    spread[range(ACCEL_BIAS, ACCEL_BIAS + 2), range(ACCEL_BIAS, ACCEL_BIAS + 2)] = found.bias_variance
+    filter_.p = spread
+    rotation = rotation_from_quaternion(*filter_.q)
+    tie_tilt(filter_.work, ONE_LANE, 0, tuple(float(each) for each in rotation), found.shared)
+    predict(filter_.work, ONE_LANE, N, 1.0, SILENT)
+    of_noise = HOVERING_M_S2**2 + (GRAVITY_M_S2 * LEVELLED_FLOOR_RAD) ** 2
+    speed = np.diag(filter_.p)[VELOCITY : VELOCITY + 2]
+    assert (speed < 1.1 * of_noise).all()
+    assert (speed < 0.5 * found.bias_variance).all()
+
+
+def test_a_shaken_vehicle_waits_a_second_for_its_mean_and_a_still_one_does_not():
+    fix = Reading(0.0, 0.0, 0.0, NAN, NAN, NAN, NAN, NAN, NAN, 255.0, 1.0, 0.0)
+    for shaken, first_s in ((0.0, 0.3), (1.5**2, LEVELLING_S)):
+        m = EMPTY._replace(attitude_s=NAN, readings=30.0, shaken=shaken, since_s=0.0)
+        assert starts(fix, m, first_s, Sensor.GPS_POSITION, math.inf)
+        assert not starts(fix, m._replace(readings=4.0), first_s, Sensor.GPS_POSITION, math.inf)
+    assert not starts(fix, m, 0.99 * LEVELLING_S, Sensor.GPS_POSITION, math.inf)
+
+
+def test_the_noise_of_a_mean_falls_with_its_readings_down_to_how_a_hover_accelerates():
+    few, many = (noise_of_mean(EMPTY._replace(readings=n, shaken=4.0)) for n in (10.0, 100.0))
+    assert few - HOVERING_M_S2**2 == pytest.approx(10.0 * (many - HOVERING_M_S2**2))
+    assert many == pytest.approx(HOVERING_M_S2**2 + 0.04)
+
+
+@pytest.mark.parametrize("shaking_m_s2", [0.0, 0.5, 3.0])
+def test_a_vehicle_on_a_slope_starts_aslant_and_what_is_left_covers_the_truth(shaking_m_s2):
     roll = 0.1
     run = started(shaking_m_s2, roll)
-    believed = believed_of(shaking_m_s2)
-    assert angles(run.said.quaternion[0])[0] == pytest.approx(believed * roll, rel=0.1, abs=1e-3)
-    left = GRAVITY_M_S2 * (math.sin(believed * roll) - math.sin(roll))
-    assert run.column(ACCEL_BIAS + 1)[0, 0] == pytest.approx(left, rel=0.1, abs=5e-3)
+    lasting, noise = doubts_of(shaking_m_s2, 100 if shaking_m_s2 == 3.0 else 50)
+    tilted = (GRAVITY_M_S2 * STANDING_TILT_RAD) ** 2
+    believed = tilted / (tilted + lasting + noise)
+    first = run.said
+    assert angles(first.quaternion[0])[0] == pytest.approx(believed * roll, rel=0.1, abs=2e-3)
+    bias = -lasting / (tilted + lasting + noise) * GRAVITY_M_S2 * math.sin(roll)
+    assert run.column(ACCEL_BIAS + 1)[0, 0] == pytest.approx(bias, rel=0.2, abs=5e-3)
     assert run.column(GYRO_BIAS)[0, 0] == pytest.approx(0.0, abs=1e-3)
-
-
-def test_what_is_left_of_the_tilts_doubt_is_stated_and_covers_the_truth():
-    for shaking_m_s2 in (0.0, 0.5, 3.0):
-        first = started(shaking_m_s2, 0.1).said
-        off = abs(angles(first.quaternion[0])[0] - 0.1)
-        assert first.std_tilt_ned_rad[0, 0] == pytest.approx(
-            STANDING_TILT_RAD * math.sqrt(1.0 - believed_of(shaking_m_s2)) + 0.005, rel=0.1
-        )
-        assert off < 3.0 * first.std_tilt_ned_rad[0, 0]
+    assert abs(angles(first.quaternion[0])[0] - roll) < 2.0 * first.std_tilt_ned_rad[0, 0]

@@ -28,7 +28,6 @@ from flownav.estimation.states import (
     VELOCITY,
 )
 
-
 OVER_GROUND_M_S = 1.0  # from this speed on the ground walks as stated: chosen, a walking pace
 
 
@@ -72,7 +71,9 @@ def propagate_walks(work: Work, lanes: Lanes, dt_s: float, settings: FilterSetti
         add_noise(work, lanes, ACCEL_BIAS + axis, squared(settings.accel_walk_m_s2_rt_s) * dt_s)
         add_noise(work, lanes, PAD + axis, squared(settings.pad_walk_m_rt_s) * dt_s)
     for lane in range(len(lanes)):
-        over = over_ground(work[(STATE + VELOCITY) * len(lanes) + lane], work[(STATE + VELOCITY + 1) * len(lanes) + lane])
+        over = over_ground(
+            work[(STATE + VELOCITY) * len(lanes) + lane], work[(STATE + VELOCITY + 1) * len(lanes) + lane]
+        )
         add_noise_lane(work, lanes, GROUND, lane, over * squared(settings.ground_walk_m_rt_s) * dt_s)
     add_noise(work, lanes, BARO, squared(settings.baro_walk_m_rt_s) * dt_s)
 

@@ -111,7 +111,9 @@ class NavigatorSettingsFile(ParameterModel):
     )
     heading_noise_rad: Number = Field(0.04, gt=0, le=3.2, description="what is left: soft iron, currents, tilt, 3 deg")
     heading_time_s: Number = Field(5.0, gt=0, le=1e4, description="and lasts this long, however often it is read")
-    ground_walk_m_rt_s: Number = Field(0.05, ge=0, le=5, description="the ground is not level: 0.4 m in a minute at 1 m/s or more, none in hover")
+    ground_walk_m_rt_s: Number = Field(
+        0.05, ge=0, le=5, description="the ground is not level: 0.4 m in a minute at 1 m/s or more, none in hover"
+    )
     baro_walk_m_rt_s: Number = Field(0.1, ge=0, le=5, description="pressure drifts 0.8 m in a minute")
     baro_sigma_m: Number = Field(1.0, gt=0, le=100, description="pressure height in the rotor's own wash")
     flow_scale_sigma: Number = Field(0.1, ge=0, le=0.5, description="optics and their mounting, without a sensor file")

@@ -185,7 +185,11 @@ def _harm(tone_hz: float, rate_hz: float) -> float:
 
 # -- position -----------------------------------------------------------------------------------------------
 def of_gps_receiver(sheet: GpsReceiverSheet) -> Keys:
-    """The receiver's errors as its sheet splits them, so that little is left for what it states of each fix."""
+    """The receiver's errors as its sheet splits them, so that little is left for what it states of each fix.
+
+    A sheet has the median of its class; what is stated is the rms over lognormal days and places, exp(spread^2) of the
+    sheet's own spread and half as much again for what the class's figure is off by.
+    """
     position, velocity = sheet.position, sheet.velocity
     rms = math.exp(1.5 * position.spread * position.spread)
     step_m, step_m_s = position.quantum_m / math.sqrt(12.0), velocity.quantum_m_s / math.sqrt(12.0)
@@ -199,12 +203,12 @@ def of_gps_receiver(sheet: GpsReceiverSheet) -> Keys:
         "gps_white_sigma_m": max(math.hypot(position.white_sigma_m, step_m), 1e-3),
         "gps_white_sigma_down_m": max(math.hypot(position.white_sigma_down_m, step_m), 1e-3),
         "gps_white_share": LEAST_SHARE,
-        "gps_velocity_sigma_m_s": rms * velocity.sigma_m_s,
-        "gps_velocity_sigma_down_m_s": rms * velocity.sigma_down_m_s,
+        "gps_velocity_sigma_m_s": velocity.sigma_m_s,
+        "gps_velocity_sigma_down_m_s": velocity.sigma_down_m_s,
         "gps_velocity_tau_s": max(velocity.tau_s, sheet.period_s),
         "gps_velocity_white_m_s": max(math.hypot(velocity.white_m_s, step_m_s), 1e-3),
         "gps_velocity_white_down_m_s": max(math.hypot(velocity.white_down_m_s, step_m_s), 1e-3),
-        "gps_velocity_lag_sigma_s": 2.0 * velocity.smoothing_tau_s,
+        "gps_velocity_lag_sigma_s": velocity.smoothing_tau_s,
         "gps_forward_m": sheet.antenna.forward_m,
         "gps_right_m": sheet.antenna.right_m,
         "gps_below_m": sheet.antenna.down_m,

@@ -38,7 +38,10 @@ COMPASS_HEADING_RAD = 0.3  # a raw magnetometer's: twice the usual hard iron (co
 DATUM_HEADING_RAD = 1e-3  # the start defines the frame
 UNTOLD_HEADING_RAD = 1.0  # the first heading that is told will, 0.5 rad off (test_an_external_heading_is_taken)
 LEAST_LEVELLING, MOST_LEVELLING = 5.0, 100.0  # readings whose mean is level: 0.1 to 2 s at 50 Hz
-LEVELLED_M_S2, LEVELLING_S = 0.1, 1.0  # so sure a mean will do (0.6 deg); of a shaken vehicle's a second's is waited for
+LEVELLED_M_S2, LEVELLING_S = (
+    0.1,
+    1.0,
+)  # so sure a mean will do (0.6 deg); of a shaken vehicle's a second's is waited for
 HOVERING_M_S2 = 0.1  # how a vehicle may accelerate over that second: chosen; gusts, and one that starts on its way
 RECTIFIED_SHARE = 0.1  # of what shakes an accelerometer lasts in its mean: chosen; 1 is the false roll of `landing`
 

@@ -17,8 +17,8 @@ from flownav.navigation.motion_records import CourseMemory, PushMemory
 from flownav.navigation.offers import note_aid, note_aid_age, note_height
 from flownav.navigation.place import (
     LEFT,
-    NEVER_STOOD,
     MANY_STRAYS,
+    NEVER_STOOD,
     SEEN,
     STOOD_ON,
     Pad,

@@ -210,7 +210,7 @@ def test_flow_and_range_are_not_taken_at_a_steep_tilt(hover):
     run = navigate(hover.changed(Sensor.IMU, value=value).only(Sensor.IMU, Sensor.FLOW_RATE, Sensor.RANGE))
     assert run.reasons(Sensor.RANGE)["tilted"] > 150
     for sensor, instead in ((Sensor.FLOW_RATE, {"tilted", "no_height"}), (Sensor.RANGE, {"tilted"})):
-        late = run.offered.reason[(run.offered.sensor == sensor) & (run.offered.t_s >= 10.9)].astype(int)
+        late = run.offered.reason[(run.offered.sensor == sensor) & (run.offered.t_s >= 11.0)].astype(int)
         assert Reason(late[0]).label == "tilted"
         assert {Reason(code).label for code in late} == instead  # without a range the height is lost in the end
 

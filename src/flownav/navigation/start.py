@@ -42,7 +42,7 @@ LEVELLED_M_S2, LEVELLING_S = (
     0.1,
     1.0,
 )  # so sure a mean will do (0.6 deg); of a shaken vehicle's a second's is waited for
-HOVERING_M_S2 = 0.1  # how a vehicle may accelerate over that second: chosen; gusts, and one that starts on its way
+HOVERING_M_S2 = 0.15  # how a vehicle may accelerate over that second: chosen; with 0.1 laps from the start err 2.6 sigma
 RECTIFIED_SHARE = 0.1  # of what shakes an accelerometer lasts in its mean: chosen; 1 is the false roll of `landing`
 
 with_force = replacing(StartMemory, "force_x", "force_y", "force_z", "readings", "shaken", "since_s")

@@ -155,7 +155,7 @@ def test_the_interval_at_which_a_campaign_stops_holds_as_often_as_it_says():
 def test_stops_in_words():
     assert stop_of("r95_m width <= 0.005") == ("r95_m", 0.005)
     for text in ("r95_m", "r95_m width <= 0", "r95_m width <= x", "r95_m width <= nan", "r9_m width <= 1", ""):
-        with pytest.raises(InputError, match="--until"):
+        with pytest.raises(InputError, match="until"):
             stop_of(text)
     assert all(figure.words for figure in FIGURES.values())
 

@@ -248,7 +248,7 @@ def test_two_flights_at_once_and_heights_for_a_flight_are_refused(tmp_path):
     folder = written(tmp_path, duration_s=30.0)
     with pytest.raises(InputError, match="a flight is identified alone"):
         identify([folder, folder])
-    with pytest.raises(InputError, match="--heights: a flight's heights come from its range readings"):
+    with pytest.raises(InputError, match="heights_m: a flight's heights come from its range readings"):
         identify([folder], heights_m=[1.0])
 
 

@@ -358,7 +358,7 @@ def test_the_table_is_each_window_alone(log):
 
 @pytest.mark.parametrize("bad", [(10.0, 5.0, 1.0), (0.0, 10.0, 0.0), (0.0, 10.0, 20.0), (0.0, 1e9, 1e-3)])
 def test_tables_that_cannot_be(bad):
-    with pytest.raises(InputError, match="--outage-table"):
+    with pytest.raises(InputError, match="outage_table"):
         table_windows(*bad)
 
 

@@ -12,7 +12,7 @@ from shutil import rmtree
 from tempfile import mkdtemp
 from typing import Any
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.guard import written_whole
 from flownav.core.text import to_toml
 from flownav.parts.calling import name_of
@@ -87,7 +87,9 @@ def split(filter: Any, sensors: Sequence[Any], vehicle: Any, controller: Any) ->
 def own_filter(filter: Any) -> Any:
     """The filter of a replay that is not ours; None where ours is meant."""
     if isinstance(filter, str) and filter == "paper":
-        raise InputError("--filter paper: the paper's filter flies in simulation only, where it is fed as it was")
+        raise InputError(
+            f"{arg('filter')} paper: the paper's filter flies in simulation only, where it is fed as it was"
+        )
     return None if filter is None or (isinstance(filter, str) and filter == "landing") else _part("filter", filter)
 
 

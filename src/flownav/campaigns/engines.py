@@ -17,7 +17,7 @@ import numpy as np
 from flownav.campaigns.local import rows_of
 from flownav.campaigns.plan import Ready, ready_of
 from flownav.core.compile import LANES
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 from flownav.simulation.engine import Instead, fly_blocks
 from flownav.simulation.plan import Flight
@@ -113,7 +113,7 @@ class RayCluster:
         try:
             import ray
         except ImportError:
-            raise InputError('--engine ray: Ray is not installed; pip install "flownav[cluster]"') from None
+            raise InputError(f'{arg("engine")} ray: Ray is not installed; pip install "flownav[cluster]"') from None
         self._ray = ray
         if not ray.is_initialized():
             where = address or os.environ.get("RAY_ADDRESS")
@@ -125,7 +125,7 @@ class RayCluster:
                     logging_level=logging.ERROR,
                 )
             except (ConnectionError, RuntimeError, ValueError) as error:
-                raise InputError(f"--engine ray: no cluster at {where}: {str(error).splitlines()[0]}") from None
+                raise InputError(f"{arg('engine')} ray: no cluster at {where}: {str(error).splitlines()[0]}") from None
 
     def close(self) -> None:
         """Leave the cluster; one of this machine alone ends."""

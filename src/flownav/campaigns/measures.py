@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 from flownav.core.text import finite_or_none
 from flownav.scoring.errors import SCORE_COLUMNS, touchdown_rows
@@ -204,9 +204,9 @@ def stop_of(text: str) -> Stop:
     except ValueError:
         width = np.nan
     if not found or not width > 0.0 or not np.isfinite(width):
-        raise InputError(f'--until {text!r}: a figure and a width are needed, such as "r95_m width <= 0.005"')
+        raise InputError(f'{arg("until")} {text!r}: a figure and a width are needed, such as "r95_m width <= 0.005"')
     if found[1] not in FIGURES:
-        raise InputError(f"--until {text!r}: no such figure; known: {', '.join(FIGURES)}")
+        raise InputError(f"{arg('until')} {text!r}: no such figure; known: {', '.join(FIGURES)}")
     return Stop(found[1], width)
 
 

@@ -16,7 +16,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from flownav.campaigns.measures import FIGURES, MEASURES, stop_of
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 from flownav.core.parameter_files import check
 from flownav.core.provenance import code_sha256
@@ -215,13 +215,13 @@ def planned(
     """Every scenario with these changes at every combination of the swept values. InputError for one that cannot be."""
     fixed, names = dict(changes or {}), tuple(sweeps)
     if both := sorted(set(fixed) & set(names)):
-        raise InputError(f"--sweep {both[0]}: is set as well; leave one of the two out")
+        raise InputError(f"{arg('sweep')} {both[0]}: is set as well; leave one of the two out")
     if len({scenario.name for scenario in scenarios}) < len(scenarios):
         raise InputError(f"{scenarios[0].name}: two scenarios have the same name, and the same flights; leave one out")
     combinations = [dict(zip(names, each, strict=True)) for each in itertools.product(*sweeps.values())]
     count = len(scenarios) * len(combinations) * len(truth_models)
     if count > MOST_CELLS:
-        raise InputError(f"--sweep: {count} combinations; at most {MOST_CELLS} are flown in one campaign")
+        raise InputError(f"{arg('sweep')}: {count} combinations; at most {MOST_CELLS} are flown in one campaign")
     cells = tuple(
         Cell(changed(scenario, fixed | values), values, truth_model, (*fixed, *names))
         for scenario in scenarios
@@ -237,7 +237,9 @@ def _require_figure(name: str, cells: Sequence[Cell]) -> None:
     """InputError where a cell has no such figure: it never lands."""
     never = next((cell for cell in cells if not lands(cell.scenario)), None)
     if never is not None and MEASURES[FIGURES[name].measure].of_landing:
-        raise InputError(f"--until {name}: the scenario {never.scenario.name} never lands; give p95_axis_m, or another")
+        raise InputError(
+            f"{arg('until')} {name}: the scenario {never.scenario.name} never lands; give p95_axis_m, or another"
+        )
 
 
 def lands(scenario: Scenario) -> bool:

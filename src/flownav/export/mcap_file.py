@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.guard import written_whole
 from flownav.core.record import Column, Record, Table
 from flownav.core.version import __version__
@@ -81,7 +81,7 @@ def write_mcap(record: Record, path: Path) -> tuple[list[Path], list[str]]:
     try:
         from mcap.writer import Writer
     except ImportError as error:
-        raise InputError("--to mcap needs the package mcap: pip install 'flownav[mcap]'") from error
+        raise InputError(f"{arg('to')} mcap needs the package mcap: pip install 'flownav[mcap]'") from error
     shift_s = shift_needed_s(record)
     paths = trajectories(record)
     channels, notes = [], [note for one in paths for note in one.notes]

@@ -11,7 +11,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.guard import written_whole
 from flownav.core.provenance import hash_of
 from flownav.core.record import Record
@@ -237,7 +237,9 @@ def _clock_start_s(record: Record, original: Path) -> float:
     """What the original's clock showed at time 0 of the record."""
     start_s = record.manifest.get("clock_start_s")
     if start_s is None:
-        raise InputError(f"--merge {original}: the record does not say when its time began there; replay the log again")
+        raise InputError(
+            f"{arg('original')} {original}: the record does not say when its time began there; replay the log again"
+        )
     return float(start_s)
 
 
@@ -259,9 +261,11 @@ def _from_zero_on(contents: Contents) -> Contents:
 def _read_original(record: Record, original: Path) -> bytes:
     """The log's bytes. InputError where it cannot be read or is not among the record's inputs."""
     if not original.is_file():
-        raise InputError(f"--merge {original}: no such file; give the log that was replayed")
+        raise InputError(f"{arg('original')} {original}: no such file; give the log that was replayed")
     inputs = record.manifest.get("provenance", {}).get("inputs", {}).values()
     hashes = {value["sha256"] if isinstance(value, dict) else value for value in inputs}
     if hash_of(original) not in hashes:
-        raise InputError(f"--merge {original}: the record was not replayed from this file (its SHA-256 differs)")
+        raise InputError(
+            f"{arg('original')} {original}: the record was not replayed from this file (its SHA-256 differs)"
+        )
     return original.read_bytes()

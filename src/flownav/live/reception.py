@@ -9,7 +9,7 @@ from collections import Counter, deque
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.logs.mavlink import clock as stamps
 from flownav.logs.mavlink.framing import INVALID_AUTOPILOT, Message, StreamFrames, coder, dialect
 from flownav.logs.mavlink.signing import SignatureCheck
@@ -53,9 +53,9 @@ def accepted_of(text: str) -> Accepted:
     """MESSAGE=SYSTEM.COMPONENT, e.g. LANDING_TARGET=1.191; 0 stands for any. InputError where it is not that."""
     found = re.fullmatch(r"(?P<name>[A-Z][A-Z0-9_]*)=(?P<system>\d{1,3})\.(?P<component>\d{1,3})", text)
     if found is None or max(int(found["system"]), int(found["component"])) > 255:
-        raise InputError(f"--accept {text}: MESSAGE=SYSTEM.COMPONENT is needed, e.g. LANDING_TARGET=1.191")
+        raise InputError(f"{arg('accept')} {text}: MESSAGE=SYSTEM.COMPONENT is needed, e.g. LANDING_TARGET=1.191")
     if not hasattr(dialect(), f"MAVLINK_MSG_ID_{found['name']}"):
-        raise InputError(f"--accept {text}: MAVLink has no message {found['name']}")
+        raise InputError(f"{arg('accept')} {text}: MAVLink has no message {found['name']}")
     return Accepted(found["name"], int(found["system"]) or None, int(found["component"]) or None)
 
 

@@ -28,7 +28,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, Table
@@ -186,7 +186,7 @@ def read_crazyflie(path: Path, *, flow_instance: int | None = None) -> Log:
     (a Crazyflie has one flow deck).
     """
     if flow_instance is not None:
-        raise InputError(f"--flow-instance: {path} is of a Crazyflie, with one flow deck; leave it out")
+        raise InputError(f"{arg('flow_instance')}: {path} is of a Crazyflie, with one flow deck; leave it out")
     blocks = read_blocks(path)
     start_s = min((float(np.min(block.t_s)) for block in blocks.found if len(block.t_s)), default=0.0)
     for block in blocks.found:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.logs.assembly import possible_variance
 from flownav.logs.ulog_topics import Topic, Topics
@@ -35,7 +35,7 @@ def flow_topic(path: Path, topics: Topics, instance: int | None) -> Topic | None
         if instance is None:
             return None
         listed = ", ".join(topic.label for topic in present) or "no optical flow at all"
-        raise InputError(f"{path}: --flow-instance {instance} is not in the log; it has {listed}")
+        raise InputError(f"{path}: {arg('flow_instance')} {instance} is not in the log; it has {listed}")
     most = max(map(_seen_s, asked))
     preferred = next(topic for topic in asked if _seen_s(topic) >= ENOUGH * most).name
     return max((topic for topic in asked if topic.name == preferred), key=_seen_s)

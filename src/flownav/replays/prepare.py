@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.compile import kernel
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array, EventQueue, Sensor, Stream, merge, merged_parts
 from flownav.logs.frames import attitude_rates, mean_over
 from flownav.logs.log import Log
@@ -129,13 +129,13 @@ def withhold(log: Log, queue: EventQueue, options: ReplayOptions) -> EventQueue:
 
 def _check(log: Log, options: ReplayOptions) -> None:
     if not 0.0 <= options.gps_delay_s <= 5.0:
-        raise InputError(f"--gps-delay {options.gps_delay_s:g}: seconds from 0 to 5 are needed")
+        raise InputError(f"{arg('gps_delay_s')} {options.gps_delay_s:g}: seconds from 0 to 5 are needed")
     if not all(SCALE_LIMITS[0] <= scale <= SCALE_LIMITS[1] for scale in options.flow_scale):
         raise InputError(
-            f"--flow-scale {options.flow_scale[0]:g},{options.flow_scale[1]:g}: factors from {SCALE_LIMITS[0]:g} to "
-            f"{SCALE_LIMITS[1]:g} are needed; a wrong sign belongs mended in the log"
+            f"{arg('flow_scale')} {options.flow_scale[0]:g},{options.flow_scale[1]:g}: factors from "
+            f"{SCALE_LIMITS[0]:g} to {SCALE_LIMITS[1]:g} are needed; a wrong sign belongs mended in the log"
         )
-    check_windows(log, options.gps_outages_s, "--gps-outage")
+    check_windows(log, options.gps_outages_s, arg("gps_outages"))
 
 
 def check_windows(log: Log, windows: Iterable[tuple[float, float]], option: str) -> None:

@@ -149,7 +149,7 @@ def _words(fit: Fit) -> str:
         words.append(f"heading is off by about {degrees:.0f} deg (the logged yaw lies {side} the course by GPS)")
     if abs(fit.clock_s) >= LEAST_CLOCK_ERROR_S:
         late = "late" if fit.clock_s > 0 else "early"
-        words.append(f"GPS clock is {late} by about {abs(fit.clock_s):.1f} s (beyond --gps-delay)")
+        words.append(f"GPS clock is {late} by about {abs(fit.clock_s):.1f} s (beyond the delay that is told)")
     return " and ".join(words)
 
 

@@ -15,7 +15,7 @@ from flownav.campaigns.measures import MEASURES, NOT_LANDED
 from flownav.campaigns.plan import INSIDE, Cell, Plan, lands
 from flownav.campaigns.requirement import NO_FAULT, OWN_SENSOR, Requirement, fixed_by, scenario_of
 from flownav.campaigns.store import PLAN, plan_in
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.parameter_files import check
 from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario
@@ -69,12 +69,12 @@ def require_planned(plan: Plan, folder: Path) -> None:
     if asked is not None and list(asked) != list(plan.asked):
         raise InputError(
             f"{folder}: was flown for {'; '.join(map(str, asked))}; to judge its flights by something else takes more "
-            "risk than is stated: give another --out, and another seed in the requirement"
+            "risk than is stated: give another folder, and another seed in the requirement"
         )
     if planned != plan.flights:
         raise InputError(
             f"{folder}: was planned with {planned} flights a cell, not {plan.flights}; to add flights until they pass "
-            "takes more risk than is stated: give another --out, and another seed in the requirement"
+            "takes more risk than is stated: give another folder, and another seed in the requirement"
         )
 
 
@@ -86,7 +86,7 @@ def cells_of(requirement: Requirement, vehicle: str | None = None) -> tuple[Cell
     conditions = requirement.conditions
     if vehicle is not None and conditions.vehicle:
         raise InputError(
-            f"--vehicle {vehicle}: {requirement.name} names vehicles in its conditions; leave one of the two out"
+            f"{arg('vehicle')} {vehicle}: {requirement.name} names vehicles in its conditions; leave one of the two out"
         )
     lists: dict[str, tuple[Any, ...]] = {
         "vehicle": conditions.vehicle,

@@ -10,7 +10,7 @@ from flownav.campaigns.measures import Event
 from flownav.campaigns.rare import walk
 from flownav.campaigns.rare.branches import Branch, Space
 from flownav.campaigns.rare.likely import Response, effective, rank_inputs, rank_noise, responses_to
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 from flownav.core.text import finite_or_none
 from flownav.scoring.percentiles import share_with_interval
@@ -183,7 +183,7 @@ def estimate_rare(
     is the same on any number of threads. InputError where `flights` is too small, or as `Ensemble`.
     """
     if flights < FEWEST_FLIGHTS:
-        raise InputError(f"--flights {flights}: a rare event needs {FEWEST_FLIGHTS} or more")
+        raise InputError(f"{arg('flights')} {flights}: a rare event needs {FEWEST_FLIGHTS} or more")
     space = Space(setup, seed, dispersed=dispersed)
     responses = responses_to(event, Limits(**setup.flight.limits._asdict()), space.usual(USUAL_FLIGHTS, threads))
     on_progress(USUAL_FLIGHTS)

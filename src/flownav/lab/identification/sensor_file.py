@@ -71,7 +71,7 @@ def write_whole(path: Path, text: str) -> None:
         with written_whole(path) as temporary:
             temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
+        raise InputError(f"{path}: cannot be written ({error.strerror}); give another name") from error
 
 
 # -- the tables ----------------------------------------------------------------------------------------------

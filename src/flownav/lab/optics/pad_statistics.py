@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import binom, norm
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 from flownav.lab.optics.pad_trial import TrialFrame
 
@@ -122,7 +122,10 @@ def biases_and_laws(c: dict[str, Array]) -> tuple[dict[int, FlightBias], NoiseLa
                 biases[int(flight)], left[own] = _bias(c, own, angle, distance)
         kept = np.isfinite(left).all(1)
         if kept.sum() < LEAST_FRAMES:
-            raise InputError("pad: too few frames with a fix for a datasheet; give more --frames, or other --heights")
+            raise InputError(
+                "pad: too few frames with a fix for a datasheet; "
+                f"give more {arg('frames')}, or other {arg('heights_m')}"
+            )
         h, w, flights = c["reach_m"][kept], c["image_rate_rad_s"][kept], c["flight"][kept]
         angle = fitted_noise(left[kept, :2], h, w, flights)
         distance = fitted_noise(left[kept, 2:3], h, w, flights)
@@ -186,7 +189,7 @@ def missed_law(c: dict[str, Array], max_height_m: float) -> MissedLaw:
     missed = 1.0 - c["found"]
     flights = [f for f in np.unique(c["flight"][used]) if (easy & (c["flight"] == f)).sum() >= LEAST_FRAMES]
     if not flights:
-        raise InputError("pad: too few slow frames from below; give more --frames")
+        raise InputError(f"pad: too few slow frames from below; give more {arg('frames')}")
     counts = np.array([(easy & (c["flight"] == f)).sum() for f in flights])
     shares = hidden_shares(np.array([missed[easy & (c["flight"] == f)].sum() for f in flights]), counts)
     by_flight = dict(zip(flights, shares, strict=True))

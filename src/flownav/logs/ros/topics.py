@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 
 ODOMETRY, POSE_STAMPED = "nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped"
@@ -157,7 +157,7 @@ def asked_topics(texts: Iterable[str]) -> dict[str, str]:
         role, _, topic = text.partition("=")
         if not topic or role in found:
             why = "is the second for its role" if topic else "ROLE=TOPIC is needed"
-            raise InputError(f"--topic {text}: {why}; the roles are {', '.join(each.name for each in ROLES)}")
+            raise InputError(f"{arg('topics')} {text}: {why}; the roles are {', '.join(each.name for each in ROLES)}")
         found[role] = topic
     return found
 
@@ -183,7 +183,7 @@ def chosen(
         if role.name == "flow" and flow_instance is not None:
             if not 0 <= flow_instance < len(fitting):
                 names = ", ".join(f"{k} ({topic.topic})" for k, topic in enumerate(fitting)) or "none"
-                raise InputError(f"--flow-instance {flow_instance}: the bag's flow topics are {names}")
+                raise InputError(f"{arg('flow_instance')} {flow_instance}: the bag's flow topics are {names}")
             fitting = [fitting[flow_instance]]
         taken, why = _best(role, [topic for topic in fitting if topic.topic not in asked.values()])
         if taken is None:
@@ -218,11 +218,11 @@ def _check_asked(asked: Mapping[str, str], listed: list[Gathered]) -> None:
     roles = {role.name: role for role in ROLES}
     for name, topic in asked.items():
         if name not in roles:
-            raise InputError(f"--topic {name}={topic}: the roles are {', '.join(roles)}")
+            raise InputError(f"{arg('topics')} {name}={topic}: the roles are {', '.join(roles)}")
         fitting = [each.topic for each in listed if each.kind in roles[name].kinds]
         if topic not in fitting:
             raise InputError(
-                f"--topic {name}={topic}: no such topic; for {name} the bag has {', '.join(fitting) or 'none'}"
+                f"{arg('topics')} {name}={topic}: no such topic; for {name} the bag has {', '.join(fitting) or 'none'}"
             )
 
 

@@ -19,7 +19,7 @@ from flownav.parts.calling import name_of
 from flownav.parts.naming import OURS, part_of, require
 from flownav.parts.protocols import Parts
 
-LONGEST = 200  # characters of one argument
+LONGEST_ARGUMENT = 200  # characters of one argument
 
 
 def call_of(name: str, *arguments: Any, **options: Any) -> str:
@@ -51,7 +51,7 @@ def _is_said(value: Any) -> bool:
 
 def _shown(value: Any) -> str:
     text = repr(str(value)) if hasattr(value, "__fspath__") else repr(value)
-    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+    return text if len(text) <= LONGEST_ARGUMENT else f"{text[:LONGEST_ARGUMENT]}..."
 
 
 def require_from(name: str, value: int, low: int, high: int) -> None:

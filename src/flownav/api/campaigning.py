@@ -22,7 +22,7 @@ from flownav.campaigns.rare.branches import read_branch, replayed, write_branch
 from flownav.campaigns.rare.estimate import Rare, estimate_rare
 from flownav.campaigns.run import Progress, Watch, engine_named, record_path, run_campaign
 from flownav.campaigns.store import RECORDS, SUMMARY, Store
-from flownav.campaigns.summary import WORST, summary_of
+from flownav.campaigns.summary import WORST_FLIGHTS, summary_of
 from flownav.core.errors import InputError, arg
 from flownav.core.files import written_whole
 from flownav.core.provenance import called_as
@@ -86,7 +86,7 @@ def campaign(
         flights=most if flights is None else flights,
         seed=seed, sweep=sweep or {}, changes=fixed, sampling=sampling, truth_model=truth_model, until=until,
     )  # fmt: skip
-    require_from("records", records, 0, WORST)
+    require_from("records", records, 0, WORST_FLIGHTS)
     if parts.any and engine != "local":
         raise InputError(f"engine {engine}: parts of your own are flown by this process; leave it out")
     plan = replace(plan, parts=identities(parts))

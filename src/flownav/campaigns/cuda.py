@@ -36,7 +36,7 @@ from flownav.simulation.truth import TRUTH_ROWS, SensorFault, packed_truth
 
 Truths = Callable[[int, int], Array]  # of so many flights from a number on: (TRUTH_ROWS, flights); of one, for all
 
-SLICE = 512  # flights that a process draws at a time
+SLICE_FLIGHTS = 512  # flights that a process draws at a time
 WORTH_IT = 4096  # flights: fewer are drawn before other processes have started
 
 
@@ -67,7 +67,7 @@ def truths_of_cell(cell: Ready, seed: int, flights: int, processes: int) -> Iter
     pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _begin, (told, seed))
 
     def packed(first: int, count: int) -> Array:
-        ends = [*range(first, first + count, SLICE), first + count]
+        ends = [*range(first, first + count, SLICE_FLIGHTS), first + count]
         return np.concatenate(list(pool.map(_draw, ends[:-1], np.diff(ends).tolist())), axis=1)
 
     try:

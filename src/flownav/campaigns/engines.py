@@ -102,7 +102,7 @@ def neighbours(parts: Sequence[Part]) -> Iterator[list[Part]]:
 
 
 # -- a cluster ---------------------------------------------------------------------------------------------------
-AHEAD = 2  # parts that wait for each core of the cluster
+PARTS_AHEAD = 2  # parts that wait for each core of the cluster
 
 
 class RayCluster:
@@ -138,7 +138,7 @@ class RayCluster:
         told = self._ray.put((cell.setup, cell.truth_model, cell.sampling, cell.flights, cell.failure))
         key = secrets.token_hex(8)
         task = self._ray.remote(num_cpus=1, max_retries=-1)(fly_part)
-        most = AHEAD * max(1, int(self._ray.cluster_resources().get("CPU", 1)))
+        most = PARTS_AHEAD * max(1, int(self._ray.cluster_resources().get("CPU", 1)))
         waiting: deque[tuple[Part, Any]] = deque()
         for part in parts:
             waiting.append((part, task.remote([told], key, seed, part)))

@@ -134,7 +134,7 @@ def happened(event: Event, rows: Array) -> NDArray[np.bool_]:
 # -- figures of many flights -------------------------------------------------------------------------------------
 CONFIDENCE = 0.95
 FIRST_LOOK, GROWTH = 512, 1.5  # flights at the first look, and how many times as many at each further one
-TOGETHER = 256  # flights are looked at in whole files
+FLIGHTS_TOGETHER = 256  # flights are looked at in whole files
 STOP = re.compile(r"\s*(\w+)\s+width\s*<=?\s*(\S+)\s*")
 
 
@@ -214,7 +214,7 @@ def looks(most: int) -> list[int]:
     """After how many flights a stop is looked at, at most `most`; the last is `most`."""
     found, flights = [], float(FIRST_LOOK)
     while flights < most:
-        found.append(int(flights) // TOGETHER * TOGETHER)
+        found.append(int(flights) // FLIGHTS_TOGETHER * FLIGHTS_TOGETHER)
         flights *= GROWTH
     return [*found, most]
 

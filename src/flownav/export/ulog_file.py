@@ -25,7 +25,7 @@ FLAGS_SIZE, INCOMPATIBLE_AT, OFFSETS_AT = 40, 8, 16
 OFFSETS = struct.Struct("<3Q")
 CLOCKED = b"uint64_t timestamp;"
 NAMED = {"estimate": "", "truth": "_groundtruth"}  # what PX4 calls the estimate and the truth of a simulation
-APART = ("estimate", "smoothed", "truth", "autopilot", "innovation", "events")
+WRITTEN_APART = ("estimate", "smoothed", "truth", "autopilot", "innovation", "events")
 
 
 class Flags(NamedTuple):
@@ -123,7 +123,7 @@ def _check(layout: Layout, name: str, topics: list[ulog.Topic]) -> None:
     taken = sorted(layout.formats & {topic.name for topic in topics})
     if taken:
         raise InputError(f"{name}: holds {taken[0]} already; merge into the log as the vehicle wrote it")
-    if layout.next_number + len(topics) > ulog.LARGEST:
+    if layout.next_number + len(topics) > ulog.LARGEST_UINT16:
         raise InputError(f"{name}: no message numbers are left for {len(topics)} more topics")
     ours = [int(t) for topic in topics for t in (topic.time_us[:1], topic.time_us[-1:]) for t in t]
     theirs = [t for t, _ in layout.clock]
@@ -207,7 +207,7 @@ def _all_of(record: Record) -> Contents:
             if path.oriented:
                 topics.append(ulog.attitude_topic(path, f"vehicle_attitude{NAMED[path.name]}", shift_s))
     for name, table in record.tables.items():
-        if name not in APART:
+        if name not in WRITTEN_APART:
             topics.append(ulog.table_topic(name, table, shift_s))
             text = [column for column in table if is_text(table[column])]
             if text:

@@ -26,10 +26,10 @@ FLOW = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
 GYRO_BIAS_TIME_S = 10.0  # as PX4's EKF2 follows it at 10 Hz: 1 % a reading
 LONGEST_FLOW_INTERVAL = 1.5  # medians: a longer step is a gap, not an exposure; chosen
 OWN, IMU, TURNING = "sensor gyro", "imu gyro", "attitude"
-SIGNIFICANT = 3.0  # standard errors, one in 700 by chance: else the sensor's own gyro serves
+SIGNIFICANT_SIGMAS = 3.0  # standard errors, one in 700 by chance: else the sensor's own gyro serves
 LEAST_FLOW_ROWS = 50  # chosen: 5 s of a PX4FLOW at 9.5 Hz
 KEPT_QUEUE = 1 << 20  # events of a queue that is kept for the next run: 150 MB
-PART = 1 << 17  # events that are merged at a time where there are more
+MERGED_EVENTS = 1 << 17  # events that are merged at a time where there are more
 SCALE_LIMITS = (0.1, 10.0)  # chosen: recorded scales are 0.7 to 1 (../shared/data/README.md)
 # PX4 writes it once a second, ArduPilot when it changes: not repeated, a vehicle that stands with its motors running
 # wanders more than 20 m in a minute, and less than 3 as it is (test_landed)
@@ -70,7 +70,7 @@ class Prepared:
         if sum(map(len, self.streams.values())) <= KEPT_QUEUE:
             yield self.queue
         else:
-            yield from merged_parts(self.streams.values(), PART)
+            yield from merged_parts(self.streams.values(), MERGED_EVENTS)
 
     @property
     def span_s(self) -> tuple[float, float]:
@@ -302,4 +302,4 @@ def _significant(own: Array | None, other: Array) -> bool:
     if own is None:
         return True
     gain = own - other
-    return len(gain) > 0 and bool(gain.mean() > SIGNIFICANT * gain.std() / np.sqrt(len(gain) / 3.0))
+    return len(gain) > 0 and bool(gain.mean() > SIGNIFICANT_SIGMAS * gain.std() / np.sqrt(len(gain) / 3.0))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flownav.campaigns.faults.catalogue import FAULTS, NOT_FLOWN
 from flownav.campaigns.faults.flown import law_of_flight
 from flownav.campaigns.measures import MEASURES, NOT_LANDED
-from flownav.campaigns.plan import INSIDE, Cell, Plan, lands
+from flownav.campaigns.plan import EDGE_MARGIN, Cell, Plan, lands
 from flownav.campaigns.requirement import NO_FAULT, OWN_SENSOR, Requirement, fixed_by, scenario_of
 from flownav.campaigns.store import PLAN, plan_in
 from flownav.core.errors import InputError, arg
@@ -112,7 +112,7 @@ def _cell(requirement: Requirement, values: dict[str, Any], vehicle: str | None)
     failure = _failure(requirement, scenario, values.get("fault", NO_FAULT))
     cell = Cell(scenario, values, "ensemble", fixed=tuple(fixed_by(requirement)), failure=failure)
     names = tuple(requirement.conditions.ranges)
-    for share in (INSIDE, 1.0 - INSIDE):  # what cannot be is said now
+    for share in (EDGE_MARGIN, 1.0 - EDGE_MARGIN):  # what cannot be is said now
         cell.setup.ensemble(Ends(names, share)).truths(requirement.seed, 0, 1)
     return cell
 

@@ -28,9 +28,9 @@ LEAST_SHARE = 0.5  # of the frames with the whole pad in view: heights that give
 LEAST_FRAMES = 5
 EASY_RATE_RAD_S, EASY_PART = 1.75, 0.75
 SHARE_FLOOR = 1e-3  # of missed frames: fewer than that nobody measures with some thousand frames
-UNLIKELY = 0.01
+UNLIKELY_PROBABILITY = 0.01
 REACH_STEP = 1.2
-PASSES = 3
+FIT_PASSES = 3
 
 
 class Cell(NamedTuple):
@@ -115,7 +115,7 @@ def biases_and_laws(c: dict[str, Array]) -> tuple[dict[int, FlightBias], NoiseLa
     angle = distance = NoiseLaw(1.0, 0.0, 0.0, 0.0)
     left = np.full_like(c["error"], np.nan)
     biases: dict[int, FlightBias] = {}
-    for _ in range(PASSES):
+    for _ in range(FIT_PASSES):
         for flight in np.unique(c["flight"][used]):
             own = used & (c["flight"] == flight)
             if own.sum() >= LEAST_FRAMES:
@@ -219,7 +219,7 @@ def hidden_shares(missed: Array, counts: Array) -> Array:
     None where the median flight might miss as many by chance once in a hundred flights.
     """
     usual = float(np.median(missed / counts))
-    unlikely = binom.sf(missed - 1, counts, max(usual, 0.5 / counts.sum())) < UNLIKELY
+    unlikely = binom.sf(missed - 1, counts, max(usual, 0.5 / counts.sum())) < UNLIKELY_PROBABILITY
     return np.where(unlikely, (missed / counts - usual) / (1.0 - usual), 0.0)
 
 

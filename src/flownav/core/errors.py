@@ -16,12 +16,12 @@ def arg(name: str) -> str:
 class FlownavError(Exception):
     """Base of every error that flownav raises on purpose; the command line prints its one line.
 
-    marked: the message with the marks of `arg`; as text, and pickled, the error names arguments as Python does.
+    marked: the message with the marks of `arg`; as text the error names arguments as Python does.
     """
 
-    def __init__(self, marked: str) -> None:
-        super().__init__(ARGUMENT.sub(r"\1", marked))
-        self.marked = marked
+    def __init__(self, marked: object = "") -> None:
+        self.marked = str(marked)
+        super().__init__(self.naming(str))
 
     def naming(self, called: Callable[[str], str]) -> str:
         """The message with its arguments as somebody else calls them."""

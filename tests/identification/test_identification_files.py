@@ -144,8 +144,8 @@ def test_a_rig_log_that_lacks_something_says_what(tmp_path, columns, height_m, m
 @pytest.mark.parametrize(
     ("heights", "message"),
     [
-        ([0.6, 0.8], "--heights: 2 heights for 1 logs"),
-        ([-1.0], "--heights: metres from 0.01"),
+        ([0.6, 0.8], "heights_m: 2 heights for 1 logs"),
+        ([-1.0], "heights_m: metres from 0.01"),
     ],
 )
 def test_heights_that_cannot_be_are_refused(tmp_path, heights, message):

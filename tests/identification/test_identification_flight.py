@@ -202,7 +202,7 @@ def test_a_flight_that_lacks_something_says_what(tmp_path, without, message):
     ("reference", "message"),
     [
         ("truth", "no reference to identify against; truth.csv is needed"),
-        ("encoder", "--reference encoder: auto, truth (truth.csv) or gps (gps.csv) are possible for a flight"),
+        ("encoder", "reference encoder: auto, truth (truth.csv) or gps (gps.csv) are possible for a flight"),
     ],
 )
 def test_a_reference_that_is_not_there_is_refused(tmp_path, reference, message):

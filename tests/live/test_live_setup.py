@@ -16,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
+from command import printed
 from fake_autopilot import ARDUPILOT, PX4, FakeAutopilot, FakeLink
 from flownav.cli import app
 from flownav.core.errors import InputError
@@ -532,4 +533,4 @@ def test_mistakes_are_one_line(options, said, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     result = CliRunner().invoke(app, ["live", "udp:0", *options])
     assert isinstance(result.exception, InputError)
-    assert said in str(result.exception)
+    assert said in printed(result.exception)

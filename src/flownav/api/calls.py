@@ -12,14 +12,14 @@ from shutil import rmtree
 from tempfile import mkdtemp
 from typing import Any
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.guard import written_whole
 from flownav.core.text import to_toml
 from flownav.parts.calling import name_of
 from flownav.parts.naming import OURS, part_of, require
 from flownav.parts.protocols import Parts
 
-LONGEST = 200  # characters of one argument
+LONGEST_ARGUMENT = 200  # characters of one argument
 
 
 def call_of(name: str, *arguments: Any, **options: Any) -> str:
@@ -51,7 +51,7 @@ def _is_said(value: Any) -> bool:
 
 def _shown(value: Any) -> str:
     text = repr(str(value)) if hasattr(value, "__fspath__") else repr(value)
-    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+    return text if len(text) <= LONGEST_ARGUMENT else f"{text[:LONGEST_ARGUMENT]}..."
 
 
 def require_from(name: str, value: int, low: int, high: int) -> None:
@@ -87,7 +87,9 @@ def split(filter: Any, sensors: Sequence[Any], vehicle: Any, controller: Any) ->
 def own_filter(filter: Any) -> Any:
     """The filter of a replay that is not ours; None where ours is meant."""
     if isinstance(filter, str) and filter == "paper":
-        raise InputError("--filter paper: the paper's filter flies in simulation only, where it is fed as it was")
+        raise InputError(
+            f"{arg('filter')} paper: the paper's filter flies in simulation only, where it is fed as it was"
+        )
     return None if filter is None or (isinstance(filter, str) and filter == "landing") else _part("filter", filter)
 
 

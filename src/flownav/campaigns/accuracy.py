@@ -14,7 +14,7 @@ from flownav.campaigns.requirement import SHIPPED, Requirement, load_requirement
 from flownav.campaigns.requirement import scenario_of as scenario_required
 from flownav.core.text import finite_or_none
 from flownav.scoring.consistency import (
-    BAND,
+    BAND_PROBABILITY,
     GROUP_FLIGHTS,
     ErrorSums,
     anees,
@@ -114,7 +114,7 @@ def scenario_of(name: str, vehicle: str | None = None) -> Scenario:
 
 def inside(flights: int) -> str:
     """What the ANEES of so many flights is held against: that of each GROUP_FLIGHTS, of all where there are fewer."""
-    return f"steps with the ANEES of {min(flights, GROUP_FLIGHTS)} flights in its {100 * BAND:.0f} % band"
+    return f"steps with the ANEES of {min(flights, GROUP_FLIGHTS)} flights in its {100 * BAND_PROBABILITY:.0f} % band"
 
 
 def run_case(

@@ -20,7 +20,7 @@ from flownav.campaigns.engines import Part, neighbours
 from flownav.campaigns.local import home_epoch
 from flownav.campaigns.plan import Ready, ready_of
 from flownav.core.compile import ONE_LANE, WARP, NoDeviceError, Runner, announce_compilation, device_runner
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 from flownav.estimation.covariance import with_lag
 from flownav.navigation.memory import new_work
@@ -36,7 +36,7 @@ from flownav.simulation.truth import TRUTH_ROWS, SensorFault, packed_truth
 
 Truths = Callable[[int, int], Array]  # of so many flights from a number on: (TRUTH_ROWS, flights); of one, for all
 
-SLICE = 512  # flights that a process draws at a time
+SLICE_FLIGHTS = 512  # flights that a process draws at a time
 WORTH_IT = 4096  # flights: fewer are drawn before other processes have started
 
 
@@ -67,7 +67,7 @@ def truths_of_cell(cell: Ready, seed: int, flights: int, processes: int) -> Iter
     pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _begin, (told, seed))
 
     def packed(first: int, count: int) -> Array:
-        ends = [*range(first, first + count, SLICE), first + count]
+        ends = [*range(first, first + count, SLICE_FLIGHTS), first + count]
         return np.concatenate(list(pool.map(_draw, ends[:-1], np.diff(ends).tolist())), axis=1)
 
     try:
@@ -125,7 +125,9 @@ class Cuda:
         """The rows of so many flights from number `first` on, (flights, RUNNING_COLUMNS), as many as fit at a time."""
         at_once = min(self._at_once, flights, most_that_fit(self._runner.free_bytes(), flight))
         if at_once < 1:
-            raise InputError("--engine cuda: the device has no memory left for a flight; use --engine local")
+            raise InputError(
+                f"{arg('engine')} cuda: the device has no memory left for a flight; use {arg('engine')} local"
+            )
         room = Room(self._runner, flight, at_once)
         starts = range(first, first + flights, at_once)
         counts = [min(at_once, first + flights - start) for start in starts]
@@ -198,4 +200,4 @@ def _runner() -> Runner:
     try:
         return device_runner(take_here)
     except NoDeviceError as error:
-        raise InputError(f"--engine cuda: {error}; use --engine local") from error
+        raise InputError(f"{arg('engine')} cuda: {error}; use {arg('engine')} local") from error

@@ -17,7 +17,7 @@ import numpy as np
 from flownav.campaigns.local import rows_of
 from flownav.campaigns.plan import Ready, ready_of
 from flownav.core.compile import LANES
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 from flownav.simulation.engine import Instead, fly_blocks
 from flownav.simulation.plan import Flight
@@ -102,7 +102,7 @@ def neighbours(parts: Sequence[Part]) -> Iterator[list[Part]]:
 
 
 # -- a cluster ---------------------------------------------------------------------------------------------------
-AHEAD = 2  # parts that wait for each core of the cluster
+PARTS_AHEAD = 2  # parts that wait for each core of the cluster
 
 
 class RayCluster:
@@ -113,7 +113,7 @@ class RayCluster:
         try:
             import ray
         except ImportError:
-            raise InputError('--engine ray: Ray is not installed; pip install "flownav[cluster]"') from None
+            raise InputError(f'{arg("engine")} ray: Ray is not installed; pip install "flownav[cluster]"') from None
         self._ray = ray
         if not ray.is_initialized():
             where = address or os.environ.get("RAY_ADDRESS")
@@ -125,7 +125,7 @@ class RayCluster:
                     logging_level=logging.ERROR,
                 )
             except (ConnectionError, RuntimeError, ValueError) as error:
-                raise InputError(f"--engine ray: no cluster at {where}: {str(error).splitlines()[0]}") from None
+                raise InputError(f"{arg('engine')} ray: no cluster at {where}: {str(error).splitlines()[0]}") from None
 
     def close(self) -> None:
         """Leave the cluster; one of this machine alone ends."""
@@ -138,7 +138,7 @@ class RayCluster:
         told = self._ray.put((cell.setup, cell.truth_model, cell.sampling, cell.flights, cell.failure))
         key = secrets.token_hex(8)
         task = self._ray.remote(num_cpus=1, max_retries=-1)(fly_part)
-        most = AHEAD * max(1, int(self._ray.cluster_resources().get("CPU", 1)))
+        most = PARTS_AHEAD * max(1, int(self._ray.cluster_resources().get("CPU", 1)))
         waiting: deque[tuple[Part, Any]] = deque()
         for part in parts:
             waiting.append((part, task.remote([told], key, seed, part)))

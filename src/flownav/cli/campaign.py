@@ -55,13 +55,13 @@ def command(
     from flownav.api.calls import split
     from flownav.api.campaigning import plan_of
     from flownav.campaigns.run import engine_named, require_engine
-    from flownav.campaigns.summary import WORST
+    from flownav.campaigns.summary import WORST_FLIGHTS
     from flownav.cli.campaign_said import fly_again, fly_rare
     from flownav.parts.flying import OwnPartsEngine, identities
 
     planned = _planned_flights(out) if flight is not None else None
     count = _flights_of(flights, planned, until=not (until is None and rare is None))
-    require_between("--records", records, 0, WORST)
+    require_between("--records", records, 0, WORST_FLIGHTS)
     require_engine(engine)
     parts, ours, _ = split(filter_name, (), None, None)
     if parts.any and (engine != "local" or rare is not None):

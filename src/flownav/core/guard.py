@@ -128,7 +128,7 @@ def an_output(path: Path, inputs: Iterable[Path] = (), *, signed_by: Path | None
     if info is not None and info.st_size and not _is_ours(signed_by or path):
         raise InputError(
             f"{path}: is there already and was not written by flownav, or cannot be made again, so it is not replaced; "
-            "give another --out, or move it away"
+            "give another name, or move it away"
         )
     return path
 
@@ -139,7 +139,7 @@ def an_output_folder(path: Path) -> Path:
     if info is not None and stat.S_ISLNK(info.st_mode):
         raise InputError(_through_a_link(path))
     if info is not None and not stat.S_ISDIR(info.st_mode):
-        raise InputError(f"{path}: cannot be written (it is {_special(info) or 'a file'}); give a folder as --out")
+        raise InputError(f"{path}: cannot be written (it is {_special(info) or 'a file'}); give a folder's name")
     return path
 
 
@@ -174,14 +174,14 @@ def _check_kind(path: Path, info: os.stat_result) -> None:
     if stat.S_ISLNK(info.st_mode):
         raise InputError(_through_a_link(path))
     if stat.S_ISDIR(info.st_mode):
-        raise InputError(f"{path}: cannot be written (it is a folder); give a file's name as --out")
+        raise InputError(f"{path}: cannot be written (it is a folder); give a file's name")
     kind = _special(info)
     if kind:
-        raise InputError(f"{path}: cannot be written ({kind}); give another --out")
+        raise InputError(f"{path}: cannot be written ({kind}); give another name")
 
 
 def _through_a_link(path: Path) -> str:
-    return f"{path}: cannot be written (nothing is written through a symbolic link); give the name it leads to as --out"
+    return f"{path}: cannot be written (nothing is written through a symbolic link); give the name it leads to"
 
 
 def _check_no_input(path: Path, info: os.stat_result | None, inputs: Iterable[Path]) -> None:
@@ -195,10 +195,10 @@ def _check_no_input(path: Path, info: os.stat_result | None, inputs: Iterable[Pa
         taken = None if known is None else known.file(info)
         if taken is not None:
             also = "" if str(taken) == str(path) else f" (the same file as {taken})"
-            raise InputError(f"{path}{also}: this would replace what it is made from; give another --out")
+            raise InputError(f"{path}{also}: this would replace what it is made from; give another name")
         folder = None if known is None or not in_folders else known.folder_of(path)
         if folder is not None:
-            raise InputError(f"{path}: lies in {folder}, which this run reads, as one of its files; give another --out")
+            raise InputError(f"{path}: lies in {folder}, which this run reads, as one of its files; give another name")
 
 
 def _is_ours(path: Path) -> bool:

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.record import Record
 from flownav.export.trajectory import FRAMES
 
@@ -30,7 +30,7 @@ def destination(record: Path, to: str, out: Path | None) -> Path:
     under the record's name. InputError where `to` is no format.
     """
     if to not in FORMATS:
-        raise InputError(f"--to {to}: one of {', '.join(FORMATS)} is needed")
+        raise InputError(f"{arg('to')} {to}: one of {', '.join(FORMATS)} is needed")
     if to in FOLDERS:
         return out or record.with_name(record.stem + FOLDERS[to])
     suffix = SUFFIXES[to]
@@ -64,13 +64,13 @@ def export(
     nothing can be written there.
     """
     if frame is not None and frame not in FRAMES:
-        raise InputError(f"--frame {frame}: ned or enu is needed")
+        raise InputError(f"{arg('frame')} {frame}: ned or enu is needed")
     if frame is not None and to not in FRAMED:
-        raise InputError(f"--frame is for {' and '.join(FRAMED)}; mcap carries both frames, the others are NED")
+        raise InputError(f"{arg('frame')} is for {' and '.join(FRAMED)}; mcap carries both frames, the others are NED")
     if original is not None and to != "ulog":
-        raise InputError("--merge is for --to ulog")
+        raise InputError(f"{arg('original')} is for {arg('to')} ulog")
     if origin is not None and to not in ON_EARTH:
-        raise InputError(f"--origin is for {' and '.join(ON_EARTH)}")
+        raise InputError(f"{arg('origin')} is for {' and '.join(ON_EARTH)}")
     if to in ON_EARTH:
         from flownav.export.paths import write_earth
 

@@ -11,8 +11,8 @@ from flownav.core.frames import quaternion_product, rotation_from_quaternion, to
 from flownav.core.measurement import Array, Stream
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Table
 
-HALF = float(np.sqrt(0.5))
-NED_FROM_ENU = (0.0, HALF, HALF, 0.0)
+ROOT_HALF = float(np.sqrt(0.5))
+NED_FROM_ENU = (0.0, ROOT_HALF, ROOT_HALF, 0.0)
 FLU_FROM_FRD = (0.0, 1.0, 0.0, 0.0)
 
 

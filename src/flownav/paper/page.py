@@ -85,14 +85,14 @@ def _worded(finding: Finding) -> Finding:
     return finding._replace(paper=rows.kept_together(finding.paper), here=rows.kept_together(finding.here))
 
 
-WIDEST = 118
+LEAST_WIDTH = 118
 MINUS = "\N{MINUS SIGN}"
 
 
 def show(of: Reproduction, page: str) -> None:
     """Every table that was reproduced, the claims and their verdicts, and where the page lies."""
     console = Console(markup=False, highlight=False)
-    console.width = max(console.width, WIDEST)
+    console.width = max(console.width, LEAST_WIDTH)
     for table in _tables(of):
         console.print(table)
     for flown in of.flights:

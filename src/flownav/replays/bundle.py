@@ -24,7 +24,7 @@ from flownav.replays.session import Replay, replay
 from flownav.scoring.reference import velocity_of
 from flownav.sensors.datasheet import IdentifiedFlow
 
-KEPT = (
+KEPT_SENSORS = (
     Sensor.GPS_POSITION,
     Sensor.GPS_VELOCITY,
     Sensor.FLOW_RATE,
@@ -46,7 +46,7 @@ def to_record(replay: Replay, scores: dict[str, Any], command: list[str] | str) 
     record.add("states", states_table(estimate))
     if replay.smoothed is not None:
         record.add("smoothed", estimate_table(replay.smoothed))
-    for sensor in KEPT:
+    for sensor in KEPT_SENSORS:
         if sensor in replay.log.streams:
             stream = replay.log.streams[sensor]
             columns = dict(zip(COLUMNS[sensor], _with_turning(replay, sensor).T, strict=True))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from flownav.core.compile import announce_compilation
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, Table
 from flownav.estimation.gating import Reason
@@ -189,9 +189,9 @@ def replay(
     path, is to be smoothed.
     """
     if smoothed and log.fed:
-        raise InputError(f"{log.path}: --smooth takes a log; a live session's record is replayed as it was fed")
+        raise InputError(f"{log.path}: {arg('smooth')} takes a log; a live session's record is replayed as it was fed")
     if smoothed and instead is not None:
-        raise InputError(f"{log.path}: --smooth smooths our own filter's path; leave it out with another filter")
+        raise InputError(f"{log.path}: {arg('smooth')} smooths our own filter's path; leave it out with another filter")
     with announce_compilation("replay"):
         prepared = prepared_as_fed(log) if log.fed else prepare(log, options)
         return _run(log, options, settings, prepared, smoothed=smoothed, instead=instead)
@@ -216,7 +216,7 @@ def outage_table(
 
     InputError where a window lies outside the log.
     """
-    check_windows(log, windows, "--outage-table")
+    check_windows(log, windows, arg("outage_table"))
 
     def error_of(window: tuple[float, float]) -> OutageError:
         return _run(log, replace(options, gps_outages_s=(window,)), settings, prepared).outage(*window)
@@ -231,7 +231,7 @@ def outage_table(
 
 
 def table_windows(
-    t0: float, t1: float, length_s: float, *, option: str = "--outage-table"
+    t0: float, t1: float, length_s: float, *, option: str = arg("outage_table")
 ) -> list[tuple[float, float]]:
     """[t0, t0 + length), ... up to t1, the last one shorter where t1 asks for it.
 

@@ -20,7 +20,7 @@ from flownav.export.samples.ulog import write_ulog
 from flownav.live.simulated import SimulatedVehicle
 from flownav.logs.log import Log
 
-MILLIGAUSS = 1e3
+MILLIGAUSS_PER_GAUSS = 1e3
 FIX_3D = 3.0
 Columns = dict[str, Array]
 START_US = 1_767_225_600_000_000  # 2026-01-01: of the ground station's clock, which no flight was flown by
@@ -58,7 +58,7 @@ def tables_of(log: Log) -> Iterator[tuple[str, Columns]]:
     if Sensor.MAG in log.streams:
         field = log.streams[Sensor.MAG]
         names = (f"mag_{axis}_mgauss" for axis in "xyz")
-        yield "mag", {"t_s": field.t_s, **dict(zip(names, MILLIGAUSS * field.value.T, strict=True))}
+        yield "mag", {"t_s": field.t_s, **dict(zip(names, MILLIGAUSS_PER_GAUSS * field.value.T, strict=True))}
     if Sensor.LANDED in log.streams:
         t_s, landed = changes(log)
         yield "landed", {"t_s": t_s, "landed": landed}

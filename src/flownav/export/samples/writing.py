@@ -59,7 +59,7 @@ def write_samples(
         if ours or not (folder / README).exists():
             (folder / README).write_text(readme(seed), encoding="utf-8", newline="\n")
     except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({error.strerror}); give another --out") from error
+        raise InputError(f"{folder}: cannot be written ({error.strerror}); give another name") from error
     return found
 
 
@@ -67,7 +67,7 @@ def _put(sample: Sample, made: Path, path: Path, *, force: bool, ours: bool) -> 
     """Move what was made to its place."""
     content, size = _content(made), sum(map(len, _content(made).values()))
     if path.is_symlink():
-        raise InputError(f"{path}: cannot be written (nothing is written through a symbolic link); give another --out")
+        raise InputError(f"{path}: cannot be written (nothing is written through a symbolic link); give another name")
     if not path.exists():
         made.rename(path)
         return Written(sample, path, size, "written")

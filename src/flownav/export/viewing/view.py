@@ -55,7 +55,7 @@ def show(record: Record, name: str) -> list[str]:
         prepared.stream.spawn(default_blueprint=prepared.blueprint)
     except (RuntimeError, OSError) as error:
         raise InputError(
-            f"Rerun's viewer does not start ({str(error).splitlines()[0]}); give --out FILE.rrd"
+            f"Rerun's viewer does not start ({str(error).splitlines()[0]}); `flownav view --out FILE.rrd` writes a file"
         ) from error
     prepared.stream.flush()
     return prepared.notes

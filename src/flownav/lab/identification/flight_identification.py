@@ -39,7 +39,7 @@ CLUSTER_S = 3.0
 FLIGHT_ORDERS = (Structure(0), Structure(1), Structure(2))
 WORST_BIAS = 0.02
 LEAST_LIKENESS = 0.4  # of flow and reference: less is the luck of a short flight
-CLEAR = 0.8  # likeness to the IMU from which it, and not the reference, shows the dynamics
+CLEAR_LIKENESS = 0.8  # likeness to the IMU from which it, and not the reference, shows the dynamics
 
 
 class Scale(NamedTuple):
@@ -204,7 +204,7 @@ def _dynamic_runs(
     flown: Flight, moved: Motion, velocity: Array, runs: Sequence[Experiment]
 ) -> Sequence[Sequence[Experiment]]:
     """What shows the dynamics of x and of y: above 1/SPLIT_S the IMU where it serves, else the reference."""
-    if moved.fast_m_s is None or moved.flow_tie is None or moved.flow_tie.likeness < CLEAR:
+    if moved.fast_m_s is None or moved.flow_tie is None or moved.flow_tie.likeness < CLEAR_LIKENESS:
         return [[run] for run in runs]
     other = fast_flow(flown, moved.t_s, velocity)
     both = fast_experiments(flown.name, moved.t_s, moved.fast_m_s, flown.t_s[flown.good], other)

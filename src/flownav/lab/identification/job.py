@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.guard import inputs_there
 from flownav.core.measurement import Array
 from flownav.lab.identification import height_law
@@ -19,7 +19,7 @@ from flownav.lab.identification.rig_log import Run, assign_heights, is_rig, read
 from flownav.logs.open_log import log_kind
 
 SAME_HEIGHT = 0.02  # runs within 2 % of a height belong together
-UNKNOWN_HEIGHT = "its height is unknown: give --heights, height_m in rig.toml, or a ground_distance_m column"
+UNKNOWN_HEIGHT = f"its height is unknown: give {arg('heights_m')}, height_m in rig.toml, or a ground_distance_m column"
 
 
 def identify_rig(runs: Sequence[Run], candidates: Sequence[Structure], validate: bool = True) -> Findings:
@@ -133,10 +133,12 @@ def identify(
         raise InputError(f"{flights[0]}: a flight is identified alone; give rig logs together, flights one by one")
     if flights:
         if heights_m:
-            raise InputError("--heights: a flight's heights come from its range readings; leave the option out")
+            raise InputError(
+                f"{arg('heights_m')}: a flight's heights come from its range readings; leave the option out"
+            )
         return identify_flight(flights[0], structures, reference, flow_instance)
     if flow_instance is not None:
-        raise InputError("--flow-instance: a rig log holds one flow sensor; leave the option out")
+        raise InputError(f"{arg('flow_instance')}: a rig log holds one flow sensor; leave the option out")
     for path in logs:
         if not is_rig(path):
             raise InputError(

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 from flownav.lab.identification.descent import DELAY_RANGE_S, Point, Structure, gain_and_delay
 from flownav.lab.identification.experiment import LEAST_READINGS, Experiment
@@ -210,7 +210,7 @@ def parse_order(text: str) -> tuple[Structure, ...]:
         return (Structure(0),)
     order, plus, delay = text.partition("+")
     if not order.isdigit() or not 1 <= int(order) <= 6 or (plus and delay != "delay"):
-        raise InputError(f"--order {text}: auto, delay, 1 to 6, or an order with +delay (2+delay) is needed")
+        raise InputError(f"{arg('order')} {text}: auto, delay, 1 to 6, or an order with +delay (2+delay) is needed")
     return (Structure(int(order), bool(plus)),)
 
 

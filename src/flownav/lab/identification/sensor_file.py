@@ -23,12 +23,12 @@ from flownav.lab.identification.quantities import Interval, coefficients, numera
 from flownav.sensors.datasheet import FlowSensor
 
 SHORTEST_LATENCY_S = 0.005
-STEEPEST = 4.0
-DIGITS = 7  # of the numbers in the file
+STEEPEST_EXPONENT = 4.0
+FILE_DIGITS = 7  # of the numbers in the file
 
 
 def sensor_entries(findings: Findings, base: FlowSensor, name: str, provenance: str) -> dict[str, Any]:
-    """The file's content as nested dictionaries, in the order in which it is written, numbers of DIGITS digits."""
+    """The file's content as nested dictionaries, in the order in which it is written, numbers of FILE_DIGITS digits."""
     entries = {
         "schema_version": 1,
         "name": name,
@@ -54,7 +54,7 @@ def _rounded(value: Any) -> Any:
         return {key: _rounded(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [_rounded(item) for item in value]
-    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
+    return float(f"{value:.{FILE_DIGITS}g}") if isinstance(value, float) else value
 
 
 def write_sensor(path: Path, entries: Mapping[str, Any]) -> FlowSensor:
@@ -71,7 +71,7 @@ def write_whole(path: Path, text: str) -> None:
         with written_whole(path) as temporary:
             temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
+        raise InputError(f"{path}: cannot be written ({error.strerror}); give another name") from error
 
 
 # -- the tables ----------------------------------------------------------------------------------------------
@@ -113,7 +113,7 @@ def bessel(latency_s: float) -> tuple[float, float]:
 
 def _noise(findings: Findings) -> dict[str, Any]:
     law = findings.noise.law
-    exponent = float(np.clip(law.exponent.value, -STEEPEST, STEEPEST))
+    exponent = float(np.clip(law.exponent.value, -STEEPEST_EXPONENT, STEEPEST_EXPONENT))
     source = f"{len(findings.noise.points)} heights, weighted least squares of log sigma on log h, +- 95 %"
     entries: dict[str, Any] = {"law": "power" if law.high_m > law.low_m and exponent != 0.0 else "constant"}
     entries["sigma_m_s"] = _valued(law.sigma_m_s, source)

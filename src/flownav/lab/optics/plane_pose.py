@@ -9,7 +9,7 @@ import numpy as np
 
 from flownav.core.measurement import Array
 
-STEPS = 30
+MOST_STEPS = 30
 
 
 class PlanePose(NamedTuple):
@@ -94,7 +94,7 @@ def _refined(rotation: Array, place_m: Array, figure_m: Array, tangents: Array) 
     """Levenberg-Marquardt on three small turns and the place."""
     damping = 1e-3
     error, slope = _error(rotation, place_m, figure_m, tangents)
-    for _ in range(STEPS):
+    for _ in range(MOST_STEPS):
         normal = slope.T @ slope
         step = np.linalg.lstsq(normal + damping * np.diag(np.diag(normal) + 1e-15), -slope.T @ error, rcond=None)[0]
         turned, moved = _turn(np.asarray(step[:3], float)) @ rotation, place_m + step[3:]

@@ -45,7 +45,7 @@ def write_rig_folder(log: RigLog, folder: Path, command: str = "", *, dated: boo
                 temporary = both.enter_context(written_whole(folder / name, replacing=True))
                 temporary.write_text(content, encoding="utf-8", errors="backslashreplace")
     except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({error.strerror}); give another --out") from error
+        raise InputError(f"{folder}: cannot be written ({error.strerror}); give another name") from error
 
 
 def run_folders(folder: Path, count: int) -> Iterator[Path]:

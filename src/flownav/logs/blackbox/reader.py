@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import Table
@@ -57,7 +57,9 @@ def read_blackbox(path: Path, *, flow_instance: int | None = None) -> Log:
     flow instance is asked for.
     """
     if flow_instance is not None:
-        raise InputError(f"--flow-instance: {path} is a blackbox log, with one flow sensor at most; leave it out")
+        raise InputError(
+            f"{arg('flow_instance')}: {path} is a blackbox log, with one flow sensor at most; leave it out"
+        )
     content = content_of(path, "a blackbox log", MOST_BYTES)
     found = headers(content)
     if not found:

@@ -23,7 +23,7 @@ GYRO_LIMIT_RAD_S = 70.0  # twice the range of a 2000 deg/s gyro
 RANGE_GOOD, FACING_DOWN = 4, 25  # RangeFinder::Status::Good, ROTATION_PITCH_270
 LEAST_FIX = 3  # GPS_OK_FIX_3D
 LANDED_BY_EVENT = {11: 1.0, 18: 1.0, 28: 0.0}  # disarmed, land complete, not landed (AP_Logger's LogEvent)
-MILLIGAUSS = 1e-3
+GAUSS_PER_MILLIGAUSS = 1e-3
 
 # of several sensors the one with the most rows of this kind: a GPS in use, flow with data, range downward
 PREFERRED: dict[str, tuple[str, Callable[[NDArray[Any]], NDArray[np.bool_]]]] = {
@@ -59,7 +59,7 @@ FIELDS: dict[str, tuple[Field, ...]] = {
     ),
     "BARO": (Field("Alt", -1000, 20000), Field("Health", 0, 255, required=False)),
     "MAG": (
-        *(Field(f"Mag{axis}", -20, 20, factor=MILLIGAUSS) for axis in "XYZ"),
+        *(Field(f"Mag{axis}", -20, 20, factor=GAUSS_PER_MILLIGAUSS) for axis in "XYZ"),
         Field("Health", 0, 255, required=False),
     ),
     "EV": (Field("Id", 0, 255),),

@@ -26,7 +26,7 @@ Message = Any  # a message that pymavlink decoded or built
 MAVLINK_1, MAVLINK_2 = 0xFE, 0xFD
 HEADER_1, HEADER_2 = 6, 10
 CHECKSUM_BYTES, SIGNATURE_BYTES = 2, 13
-SIGNED = 0x01
+SIGNED_FLAG = 0x01
 TIMESTAMP_BYTES = 8
 LARGEST_FRAME = HEADER_2 + 255 + CHECKSUM_BYTES + SIGNATURE_BYTES
 OPEN_END = re.compile(rb"\xfd.{0,8}\Z", re.DOTALL)  # the beginning of a header whose rest is still to come
@@ -150,7 +150,7 @@ class Check:
             return "truncated"
         length, signed = content[start + 1], False
         if header == HEADER_2:
-            if content[start + 2] & ~SIGNED:
+            if content[start + 2] & ~SIGNED_FLAG:
                 return "no_header"
             signed = bool(content[start + 2])
             system, component = content[start + 5], content[start + 6]

@@ -27,7 +27,7 @@ from flownav.logs.mavlink.framing import (
     HEADER_2,
     MAVLINK_2,
     SIGNATURE_BYTES,
-    SIGNED,
+    SIGNED_FLAG,
 )
 
 KEY_BYTES = 32
@@ -120,7 +120,7 @@ class SignatureCheck:
 
     def _reason(self, frame: bytes) -> str:
         least = HEADER_2 + CHECKSUM_BYTES + SIGNATURE_BYTES
-        if len(frame) < least or frame[0] != MAVLINK_2 or not frame[2] & SIGNED or len(frame) != least + frame[1]:
+        if len(frame) < least or frame[0] != MAVLINK_2 or not frame[2] & SIGNED_FLAG or len(frame) != least + frame[1]:
             return "unsigned"
         expected = hashlib.sha256(self._key + frame[:-6]).digest()[:6]
         if not hmac.compare_digest(expected, frame[-6:]):

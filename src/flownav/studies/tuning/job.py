@@ -158,7 +158,7 @@ def write_settings(path: Path, tuned: Tuned, stated: NavigatorSettingsFile | Non
             temporary.write_text(settings_text(tuned, stated, command), encoding="utf-8", errors="backslashreplace")
             load(temporary, NavigatorSettingsFile)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
+        raise InputError(f"{path}: cannot be written ({error.strerror}); give another name") from error
 
 
 def settings_text(tuned: Tuned, stated: NavigatorSettingsFile | None, command: str) -> str:

@@ -6,16 +6,16 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.measurement import Array
-from flownav.studies.tuning.scores import WORTH, Gains
+from flownav.studies.tuning.scores import WORTH_NATS, Gains
 
-DRAWS = 10_000
-MEASURED = 20260  # a seed each, so that the same logs give the same answer
-JUDGED = 20261
+RESAMPLES = 10_000
+MEASURED_SEED = 20260  # a seed each, so that the same logs give the same answer
+JUDGED_SEED = 20261
 CONFIDENCE = 0.95
 
 
 def resampled(by_log: Sequence[Array], seed: int) -> Array:
-    """Means of drawn windows, (DRAWS, k): of each log's (w, k) or (w,) as many as it has, with replacement.
+    """Means of drawn windows, (RESAMPLES, k): of each log's (w, k) or (w,) as many as it has, with replacement.
 
     Windows are drawn log by log, and logs count alike.
     """
@@ -23,13 +23,13 @@ def resampled(by_log: Sequence[Array], seed: int) -> Array:
     total: Array = np.zeros(())
     for values in by_log:
         columns = values.reshape(len(values), -1)
-        weights = draw.multinomial(len(columns), np.full(len(columns), 1.0 / len(columns)), DRAWS) / len(columns)
+        weights = draw.multinomial(len(columns), np.full(len(columns), 1.0 / len(columns)), RESAMPLES) / len(columns)
         total = total + weights @ columns
     return np.asarray(total / len(by_log))
 
 
 def interval_of(drawn: Array, windows: int) -> tuple[float, float]:
-    """CONFIDENCE interval of a mean of so many windows from its draws (DRAWS,): expanded percentiles.
+    """CONFIDENCE interval of a mean of so many windows from its draws (RESAMPLES,): expanded percentiles.
 
     Plain percentiles of few windows are too near to each other, by what Student's t is wider than the normal and the
     root of n / (n - 1) (Hesterberg, What Teachers Should Know About the Bootstrap, The American Statistician 69, 2015).
@@ -90,7 +90,7 @@ def judged(by_log: Sequence[Array]) -> Judged | None:
     if not counted:
         return None
     mean, windows = float(np.mean([values.mean() for values in counted])), sum(len(values) for values in counted)
-    return Judged(mean, *interval_of(resampled(counted, JUDGED)[:, 0], windows), windows)
+    return Judged(mean, *interval_of(resampled(counted, JUDGED_SEED)[:, 0], windows), windows)
 
 
 def _known(gain: Gains) -> Array:
@@ -102,7 +102,7 @@ def _verdict(total: Judged | None, error: Judged | None, apart: Judged | None) -
         return False, "no GPS, truth or flow shows the path's error in the held-out windows"
     if error.high < 0.0:
         return False, "in the held-out windows the path's error grows"
-    if error.low <= 0.0 or error.mean < WORTH:
+    if error.low <= 0.0 or error.mean < WORTH_NATS:
         return False, "in the held-out windows the path's error does not shrink beyond chance and 2 %"
     if total.low <= 0.0:
         return False, "in the held-out windows the path's error shrinks by less than the sensors' predictions lose"

@@ -8,14 +8,14 @@ import numpy as np
 
 from flownav.core.measurement import Array
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.studies.tuning.judge import MEASURED, interval_of, resampled
+from flownav.studies.tuning.judge import MEASURED_SEED, interval_of, resampled
 from flownav.studies.tuning.knobs import limits_of, penalty
-from flownav.studies.tuning.scores import WORTH, Gains, Trials
+from flownav.studies.tuning.scores import WORTH_NATS, Gains, Trials
 
 STEPS = tuple(math.log(step) for step in (2.0, 1.4, 1.2))  # of a noise, coarse to fine
 STRIDES = (-2, -1, 1, 2)  # the second over what is rough in a gain: gates that open, a heading that drifts another way
 MOST_SWEEPS = 2  # at each step
-PLACES = (-1.0, -0.5, 0.0, 0.5, 1.0)  # in coarsest steps about the best, where its profile is taken
+PROFILE_STEPS = (-1.0, -0.5, 0.0, 0.5, 1.0)  # in coarsest steps about the best, where its profile is taken
 
 
 class Found(NamedTuple):
@@ -43,7 +43,7 @@ def search(trials: Trials, settings: NavigatorSettingsFile) -> Found:
     while True:
         best = _climb(trials, best, kept, steps, limits)
         tops = [_top(trials, best, k, limits[k]) if best[k] else None for k in range(len(limits))]
-        told = [k for k in kept if _moved(tops[k]) and _worth(trials, best, k) >= WORTH]
+        told = [k for k in kept if _moved(tops[k]) and _worth(trials, best, k) >= WORTH_NATS]
         if len(told) == np.count_nonzero(best):
             return Found(
                 np.array([top.place if top else 0.0 for top in tops]), [top.interval if top else None for top in tops]
@@ -117,7 +117,7 @@ def _top(trials: Trials, best: Array, k: int, limits: tuple[float, float]) -> To
     when they are drawn anew, over the curvature of the profile, which is a parabola by least squares.
     """
     span = _step(trials, k, STEPS[0])
-    places = np.unique(np.clip(best[k] + span * np.array(PLACES), *limits))
+    places = np.unique(np.clip(best[k] + span * np.array(PROFILE_STEPS), *limits))
     flown = [trials.gains(_at(best, k, float(place))) for place in places]
     by_log = [np.array([gains[log].total for gains in flown]).T for log in range(len(trials.courses))]
     parabola = np.linalg.pinv(np.vander(places - best[k], 3))  # rows: curvature / 2, slope, value
@@ -125,7 +125,7 @@ def _top(trials: Trials, best: Array, k: int, limits: tuple[float, float]) -> To
     curvature = 2.0 * float(parabola[0] @ mean)
     if curvature >= 0.0:
         return Top(float(best[k]), limits)
-    slope, drawn = float(parabola[1] @ mean), resampled(by_log, MEASURED) @ parabola[1]
+    slope, drawn = float(parabola[1] @ mean), resampled(by_log, MEASURED_SEED) @ parabola[1]
     ends = interval_of(best[k] - drawn / curvature, _windows(flown[0]))
     place, low, high = np.clip([best[k] - slope / curvature, *ends], *limits)
     return Top(float(place), (float(low), float(high)))

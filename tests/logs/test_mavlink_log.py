@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
-from flownav.logs.frames import attitude_rates
-from flownav.logs.log import INSTEAD
+from flownav.logs.log import INSTEAD, attitude_rates
 from flownav.logs.mavlink.framing import coder
 from flownav.logs.mavlink.signing import sign_outgoing
 from flownav.logs.mavlink_log import WANTED, read_tlog

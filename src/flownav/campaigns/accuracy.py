@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.campaigns.ablations import ablations
-from flownav.campaigns.judged import BOUND_FLIGHTS, Judged, bound_of, fly_judged
+from flownav.campaigns.judged import BOUND_FLIGHTS, Judged, ablations, bound_of, fly_judged
 from flownav.campaigns.local import known_exactly
 from flownav.campaigns.measures import CRASH, measured
 from flownav.campaigns.requirement import SHIPPED, Requirement, load_requirement
@@ -25,8 +24,7 @@ from flownav.scoring.consistency import (
     over_stated,
 )
 from flownav.scoring.errors import MAX_POSITION_ERROR, touchdown_rows
-from flownav.scoring.landings import REST_DISTANCE, crashed, radius, touchdown_of_flights
-from flownav.scoring.percentiles import percentile_with_interval
+from flownav.scoring.landings import REST_DISTANCE, crashed, percentile_with_interval, radius, touchdown_of_flights
 from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.plan import Flight

@@ -17,7 +17,8 @@ DONE, BAD_VERDICT, BAD_INPUT = 0, 1, 2  # Ctrl-C: 130, as shells have it
 ELSEWHERE = {
     "report": ("records", "report"), "view": ("records", "view"), "export": ("records", "export_to"),
     "recover": ("records", "recover"), "schema": ("bench", "schema"), "tune": ("compare", "tune_settings"),
-    "sample": ("rig", "sample"),
+    "sample": ("rig", "sample"), "info": ("replay", "info"), "flow": ("identify", "flow"),
+    "validate": ("paper", "validate"), "envelope": ("campaign", "envelope"),
 }  # fmt: skip
 app = typer.Typer(
     name="flownav",

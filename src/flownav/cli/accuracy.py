@@ -10,7 +10,7 @@ import typer
 
 from flownav.cli import options
 from flownav.cli.options import chosen, option, out_option, words
-from flownav.cli.tables import Column, answer, figure, with_ends
+from flownav.cli.output import Column, answer, figure, with_ends
 
 if TYPE_CHECKING:
     from flownav.campaigns.accuracy import Case

@@ -7,7 +7,7 @@ import typer
 
 from flownav.cli import options
 from flownav.cli.options import named, option
-from flownav.cli.tables import Column, answer, say, table_of
+from flownav.cli.output import Column, answer, say, table_of
 
 WIDE = 144  # columns of the table
 COLUMNS = (

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from flownav.cli.tables import Column, answer, say, table_of, with_ends
+from flownav.cli.output import Column, answer, say, table_of, with_ends
 
 if TYPE_CHECKING:
     from flownav.campaigns.plan import Plan

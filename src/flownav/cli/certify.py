@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from flownav.cli import options
 from flownav.cli.options import argument, option, out_option, switch
-from flownav.cli.tables import Column, answer, figure, say, table_of
+from flownav.cli.output import Column, answer, figure, say, table_of
 from flownav.core.errors import InputError
 
 if TYPE_CHECKING:

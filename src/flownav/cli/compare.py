@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from flownav.cli import options
 from flownav.cli.options import named, option, out_option
-from flownav.cli.output import writing
-from flownav.cli.tables import Column, answer, plain_look, say, say_files, table, table_of
+from flownav.cli.output import Column, answer, plain_look, say, say_files, table, table_of, writing
 
 if TYPE_CHECKING:
     from flownav.studies.compare.job import Setting

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from flownav.cli import options
 from flownav.cli.options import chosen, option, out_option, switch
-from flownav.cli.tables import answer, figure, say, table
+from flownav.cli.output import answer, figure, say, table
 from flownav.core.errors import InputError, VerdictError
 
 if TYPE_CHECKING:

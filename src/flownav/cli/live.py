@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from flownav.cli import options
 from flownav.cli.options import chosen, named, one_of, option, switch
-from flownav.cli.output import require_between, require_recordable
-from flownav.cli.tables import answer, say, say_files
+from flownav.cli.output import answer, require_between, require_recordable, say, say_files
 
 if TYPE_CHECKING:
     from flownav.live.loop import Latency

@@ -10,7 +10,7 @@ import typer
 
 from flownav.cli import options
 from flownav.cli.options import chosen, numbers, option, out_option
-from flownav.cli.tables import Column, answer, figure, plain_look, say, table_of
+from flownav.cli.output import Column, answer, figure, plain_look, say, table_of
 from flownav.core.text import finite
 
 if TYPE_CHECKING:

@@ -7,8 +7,7 @@ import typer
 
 from flownav.cli import options
 from flownav.cli.options import chosen, named, option, out_option
-from flownav.cli.output import writing
-from flownav.cli.tables import answer
+from flownav.cli.output import answer, writing
 
 NO_FILE = "none is written; without a display RECORD.rrd"
 

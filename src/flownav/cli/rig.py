@@ -9,8 +9,7 @@ import typer
 
 from flownav.cli import options
 from flownav.cli.options import SAMPLES, argument, chosen, numbers, option, out_option, switch, words
-from flownav.cli.output import emit
-from flownav.cli.tables import Column, answer, say, table_of
+from flownav.cli.output import Column, answer, emit, say, table_of
 
 if TYPE_CHECKING:
     from flownav.export.samples.writing import Written

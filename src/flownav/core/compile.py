@@ -23,11 +23,18 @@ from typing import Any
 from flownav.core.compiling.beside import compile_beside
 from flownav.core.compiling.bundles import (
     FlatAccess,
+    columns_of,
     flat_access,
+    gathering,
     lane_access,
     passing,
+    places_of,
     replacing,
+    row_of,
+    row_store,
+    row_view,
     stepping,
+    width_of,
     write_function,
 )
 from flownav.core.compiling.cache import depends_also
@@ -48,11 +55,18 @@ from flownav.core.compiling.engine import LANES_WIDE, equation, kernel, procedur
 from flownav.core.compiling.pointers import invoke, pointer
 from flownav.core.compiling.progress import announce_compilation
 from flownav.core.compiling.records import Layout, OnLanes, compiled, dressed
-from flownav.core.compiling.rows import columns_of, gathering, places_of, row_of, row_store, row_view, width_of
-from flownav.core.compiling.runge_kutta import STAGES, runge_kutta
-from flownav.core.compiling.runner import NoDeviceError, Runner
-from flownav.core.compiling.scalars import bits_from_float, clamp, float_from_bits, larger, magnitude, smaller, squared
-from flownav.core.compiling.strided import WARP, strided
+from flownav.core.compiling.scalars import (
+    STAGES,
+    bits_from_float,
+    clamp,
+    float_from_bits,
+    larger,
+    magnitude,
+    runge_kutta,
+    smaller,
+    squared,
+)
+from flownav.core.compiling.strided import WARP, NoDeviceError, Runner, strided
 from flownav.core.compiling.units import Unit, unit
 
 Work = Any  # the lane buffer: a flat float64 array in Python, the address of its first element in kernels (`pointer`)

@@ -16,7 +16,7 @@ from flownav.logs.assembly import (
     stream_of_rows,
     streams_of_fixes,
 )
-from flownav.logs.frames import attitude_at
+from flownav.logs.log import attitude_at
 from flownav.logs.ulog_topics import Topic, Topics
 
 LEAST_IMU_HZ = 20.0  # slower, an inertial reading says nothing of the motion between two

@@ -15,9 +15,9 @@ from flownav.report.series import (
     outages,
     scored_outages,
 )
-from flownav.scoring.by_phase import rejected_mostly_in, scores_by_phase
 from flownav.scoring.consistency import verdict
 from flownav.scoring.phases import Phase, phase_at
+from flownav.scoring.recorded import rejected_mostly_in, scores_by_phase
 
 EVENTS_LISTED = 300
 

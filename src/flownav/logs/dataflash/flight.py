@@ -16,8 +16,7 @@ from flownav.logs.assembly import Origin, local_ned
 from flownav.logs.csv_table import CsvTable
 from flownav.logs.dataflash import sensors
 from flownav.logs.dataflash.columns import DataFlash, Field, check_rows, held_at, message_rows, text
-from flownav.logs.frames import state_table
-from flownav.logs.log import SIMULATOR, Log, absences_of
+from flownav.logs.log import SIMULATOR, Log, absences_of, state_table
 from flownav.logs.plausible import check_plausible
 
 FARTHEST_M, FASTEST_M_S = 1e5, 300.0

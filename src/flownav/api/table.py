@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
+from flownav.core.errors import InputError
 from flownav.core.record import Column
 
 if TYPE_CHECKING:
@@ -117,8 +118,6 @@ class Table(dict[str, Column]):
 def _library(name: str) -> Any:
     """A data-frame library. InputError where it is not installed."""
     from importlib import import_module
-
-    from flownav.core.errors import InputError
 
     try:
         return import_module(name)

@@ -11,8 +11,9 @@ import typer
 
 from flownav.cli import options
 from flownav.cli.options import SCENARIOS, argument, chosen, numbers, option, out_option
-from flownav.cli.output import answer, require_between, say, table
+from flownav.cli.output import answer, place, progress, require_between, say, table, writing
 from flownav.core.errors import InputError
+from flownav.core.text import number
 
 if TYPE_CHECKING:
     from flownav.api.scenario import Scenario
@@ -192,7 +193,6 @@ def _swept(text: str) -> tuple[str, list[Any]]:
 
 def _value(text: str) -> Any:
     """A number, true or false, or a text."""
-    from flownav.core.text import number
 
     text = text.strip()
     if text in ("true", "false"):
@@ -220,8 +220,6 @@ def envelope(
 ) -> None:
     """Fly a scenario in winds of many speeds and directions: a table and a polar map of the share that landed."""
     from flownav.campaigns.local import directions_deg, fly_envelope
-    from flownav.cli.output import place, progress, require_between, writing
-    from flownav.core.errors import InputError
     from flownav.report.campaign import write_envelope
     from flownav.simulation.scenario import load_scenario, with_vehicle
 

@@ -9,7 +9,9 @@ import typer
 
 from flownav.cli import options
 from flownav.cli.options import chosen, named, numbers, option, out_option
-from flownav.cli.output import Column, answer, say, say_files, table, table_of
+from flownav.cli.output import Column, answer, place, say, say_files, table, table_of
+from flownav.core.errors import InputError
+from flownav.core.text import number
 
 if TYPE_CHECKING:
     from flownav.lab.identification.findings import Findings
@@ -59,7 +61,6 @@ def command(
     require_logs(logs)
 
     from flownav.api.identifying import identify_logs
-    from flownav.cli.output import place
     from flownav.lab.identification.autopilot_parameters import AUTOPILOTS as SUFFIXES
 
     suffix = None if autopilot is None else SUFFIXES[autopilot]
@@ -76,7 +77,6 @@ def command(
 
 
 def _sensor_path(out: Path | None, logs: list[Path]) -> Path:
-    from flownav.core.errors import InputError
     from flownav.lab.identification.job import name_of
 
     path = out or Path("out") / f"{name_of(logs)}.toml"
@@ -157,9 +157,7 @@ def _rates(path: Path) -> Any:
 
     import numpy as np
 
-    from flownav.core.errors import InputError
     from flownav.core.guard import an_input
-    from flownav.core.text import number
 
     names = ("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s")
     try:

@@ -10,7 +10,19 @@ import typer
 
 from flownav.cli import options
 from flownav.cli.options import chosen, numbers, option, out_option
-from flownav.cli.output import Column, answer, figure, plain_look, say, table_of
+from flownav.cli.output import (
+    Column,
+    answer,
+    figure,
+    folder_place,
+    place,
+    plain_look,
+    progress,
+    say,
+    table_of,
+    write_text,
+)
+from flownav.core.errors import InputError
 from flownav.core.text import finite
 
 if TYPE_CHECKING:
@@ -78,7 +90,6 @@ def command(
     as_json: options.Json = False,
 ) -> None:
     """Where the pad is from the lens: angles, distance, heading; and how well, by height."""
-    from flownav.cli.output import folder_place, place
     from flownav.lab.optics.pad import PadTarget, checked
     from flownav.lab.optics.pad_trial import Trials
 
@@ -114,7 +125,6 @@ def _found(frames: list[Path], target: PadTarget, focal_px: float | None, image_
     import numpy as np
 
     from flownav.core.compile import announce_compilation
-    from flownav.core.errors import InputError
     from flownav.lab.optics.frame_files import read_frames
     from flownav.lab.optics.pad_fix import find_pad
 
@@ -152,7 +162,6 @@ def _measured(
     tilt_deg: float,
     pictures: Path | None,
 ) -> dict[str, Any]:
-    from flownav.cli.output import progress
     from flownav.core.compile import announce_compilation
     from flownav.lab.optics.pad_statistics import laws_of
     from flownav.lab.optics.pad_trial import camera_named, fly_cameras
@@ -182,7 +191,6 @@ def _plain(facts: dict[str, Any]) -> dict[str, Any]:
 def _write_datasheet(
     out: Path, facts: dict[str, Any], target: PadTarget, camera_name: str, focus_m: float | None, mounting_deg: float
 ) -> str:
-    from flownav.cli.output import write_text
     from flownav.core.provenance import command_line
     from flownav.lab.optics.pad_datasheet import Assumed, datasheet
     from flownav.lab.optics.pad_trial import camera_named

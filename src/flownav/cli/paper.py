@@ -9,7 +9,8 @@ import typer
 
 from flownav.cli import options
 from flownav.cli.options import chosen, option, out_option
-from flownav.cli.output import answer, say, table
+from flownav.cli.output import answer, place, progress, require_between, say, table, write_text, writing
+from flownav.core.errors import InputError, VerdictError
 
 if TYPE_CHECKING:
     from flownav.paper.reproduction import Reproduction
@@ -25,8 +26,6 @@ def command(
     as_json: options.Json = False,
 ) -> None:
     """Reproduce the paper: Tables 1 to 3 from the synthetic rig, 5 and 6 from flights, on one HTML page."""
-    from flownav.cli.output import place, require_between, writing
-    from flownav.core.errors import VerdictError
     from flownav.paper.reproduction import TABLES as ALL_TABLES
 
     require_between("--flights", flights, 1, 1_000_000)
@@ -43,7 +42,6 @@ def command(
 
 def _reproduced(tables: tuple[int, ...], seed: int, flights: int) -> Reproduction:
     """The reproduction behind progress bars."""
-    from flownav.cli.output import progress
     from flownav.core.compile import announce_compilation
     from flownav.paper.laboratory import rig_runs
     from flownav.paper.reproduction import FLIGHT_TABLES, RIG_TABLES, reproduce
@@ -79,8 +77,6 @@ def validate(
     as_json: options.Json = False,
 ) -> None:
     """Hold the simulator against recorded flights: outage drift, innovations, noise, as flown and as simulated."""
-    from flownav.cli.output import place, progress, require_between, write_text
-    from flownav.core.errors import InputError, VerdictError
     from flownav.core.guard import an_input
     from flownav.studies.validation.drawn import load_flights
     from flownav.studies.validation.job import replays_of

@@ -8,7 +8,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from flownav.cli import options
 from flownav.cli.options import chosen, option, out_option, switch
-from flownav.cli.output import Column, answer, figure, plain_look, say, say_files, table, table_of
+from flownav.cli.output import (
+    Column,
+    answer,
+    figure,
+    plain_look,
+    progress,
+    record_place,
+    save,
+    say,
+    say_files,
+    table,
+    table_of,
+)
+from flownav.core.errors import InputError, VerdictError
+from flownav.core.text import number
 
 if TYPE_CHECKING:
     from flownav.core.record import Record
@@ -47,8 +61,6 @@ def command(
     """Fuse a recorded flight: its trajectory, its errors against its own GPS, and the drift through GPS outages."""
     from flownav.api.calls import own_filter
     from flownav.api.replaying import replay_log
-    from flownav.cli.output import progress, record_place, save
-    from flownav.core.errors import VerdictError
     from flownav.core.parameter_files import load
     from flownav.logs.open_log import open_flight
     from flownav.logs.ros.topics import asked_topics
@@ -85,9 +97,6 @@ def _options(gps_delay_s: float, outages: list[str], flow_scale: str, *, no_flow
 def numbers(option: str, text: str, separator: str, count: int, form: str) -> tuple[float, ...]:
     """An option's numbers; InputError where it has another form than it should."""
     from math import isfinite
-
-    from flownav.core.errors import InputError
-    from flownav.core.text import number
 
     try:
         found = tuple(number(part) for part in text.split(separator))

@@ -86,7 +86,8 @@ def command(
         return _print_target(target, output.place(print_to, force=force), as_json)
     if frames:
         found = _found(frames, target, focal, image_x)
-        return output.answer(found, as_json, lambda: _show_found(found))
+        said = f"found in {found['found']} of {found['frames']} frames"
+        return output.answer(found, as_json, lambda: output.say(output.table_of(FOUND, found["per_frame"]), said))
     datasheet = None if out is None else output.place(out, force=force)
     frames_in = None if pictures is None else output.folder_place(pictures)
     at_m = sorted(set(numbers("--heights", heights, 0.05, 50.0)))
@@ -131,10 +132,6 @@ def _found(frames: list[Path], target: PadTarget, focal_px: float | None, image_
             rows.append(row)
     found = sum(row["reason"] == "found" for row in rows)
     return {"target": target._asdict(), "focal_px": focal_px, "frames": len(rows), "found": found, "per_frame": rows}
-
-
-def _show_found(facts: dict[str, Any]) -> None:
-    output.say(output.table_of(FOUND, facts["per_frame"]), f"found in {facts['found']} of {facts['frames']} frames")
 
 
 def _of_fix(row: dict[str, Any], key: str, form: str, scale: float = 1.0) -> str:

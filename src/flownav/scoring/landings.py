@@ -128,10 +128,10 @@ def touchdown_of_flight(row: Array) -> dict[str, Any] | None:
     broken = names_of(row[BROKEN])
     if not np.isfinite(row[CONTACT_DISTANCE]) and not broken and not row[ALOFT]:
         return None
-    said: dict[str, Any] = {
-        group: _or_none({name: finite_or_none(row[column_of(group, name)]) for name in names})
-        for group, names in (("contact", CONTACT), ("rest", REST), ("limited_by", LIMITED_BY))
-    }
+    said: dict[str, Any] = {}
+    for group, names in (("contact", CONTACT), ("rest", REST), ("limited_by", LIMITED_BY)):
+        figures = {name: finite_or_none(row[column_of(group, name)]) for name in names}
+        said[group] = None if all(figure is None for figure in figures.values()) else figures
     landed, times = bool(succeeded(row[None, :])[0]), int(row[GO_AROUNDS])
     return said | {"success": landed, "broken": broken, "go_arounds": times, "verdict": verdict_of(row)}
 
@@ -196,10 +196,6 @@ def _spreads(rows: Array, group: str, names: tuple[str, ...]) -> dict[str, Any]:
 
 def _largest(values: Array) -> float | None:
     return finite_or_none(percentile_with_interval(values, R_SHARE)[0]) if len(values) else None
-
-
-def _or_none(values: dict[str, float | None]) -> dict[str, float | None] | None:
-    return None if all(value is None for value in values.values()) else values
 
 
 # -- take-offs ---------------------------------------------------------------------------------------------------

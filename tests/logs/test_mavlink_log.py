@@ -483,7 +483,7 @@ def test_the_helicopters_flow_is_truths_flow(helicopter):
 
 def test_the_helicopters_log_replays(helicopter):
     result = replay(helicopter, ReplayOptions(), NavigatorSettingsFile())
-    scores = result.truth_scores()
+    scores = result.scores()["truth"]
     assert scores["horizontal_rms_m"] < 1.0
     assert scores["vertical_rms_m"] < 1.0
 

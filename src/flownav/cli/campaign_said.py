@@ -73,8 +73,7 @@ def show(summary: dict[str, Any], folder: Path, rate: float | None, records: lis
 
     cells = summary["cells"]
     lands = any("r95_m" in cell["figures"] for cell in cells)
-    named = (LANDED if lands else ALOFT).items()
-    figures = [Column(title, lambda cell, name=name: _interval(cell["figures"].get(name))) for name, title in named]
+    figures = [_of_figure(title, name) for name, title in (LANDED if lands else ALOFT).items()]
     wide = 72 + max(len(cell["label"]) for cell in cells) + 22 * len(figures)
     say(table_of((*COUNTS, *figures, *ENDS), cells, left=1), wide=wide)
     typer.echo("worst flights (CELL:FLIGHT):")
@@ -89,6 +88,10 @@ def show(summary: dict[str, Any], folder: Path, rate: float | None, records: lis
     typer.echo(f"folder  {folder}   page  {folder / 'report.html'}")
     for path in records:
         typer.echo(f"record  {path}")
+
+
+def _of_figure(title: str, name: str) -> Column:
+    return Column(title, lambda cell: _interval(cell["figures"].get(name)))
 
 
 def _landed(cell: dict[str, Any]) -> str:

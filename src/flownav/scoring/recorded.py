@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flownav.core.errors import InputError
 from flownav.core.measurement import COLUMNS, Array, Sensor
 from flownav.core.record import POSITION_NED, PROTECTION_LEVELS, QUATERNION, VELOCITY_BODY, Column, Record
-from flownav.scoring.consistency import consistency_of
+from flownav.scoring.consistency import consistency_by_sensor
 from flownav.scoring.errors import MAX_POSITION_ERROR, STATES, STATISTICS, score_block, scores_of_flight
 from flownav.scoring.landings import takeoff_of_flight, takeoffs
 from flownav.scoring.path import References, columns_of, end_drift_of, motion_of, path_scores, truth_motion
@@ -129,12 +129,28 @@ def _column(table: Mapping[str, Column], name: str) -> Array:
 # -- replays ---------------------------------------------------------------------------------------------------------
 def replay_scores(record: Record, estimate: Estimate) -> dict[str, Any]:
     """Errors of an estimate against what the record of a replay kept of its log."""
-    known = references_in(record)
+    known, judged = references_in(record), record.tables["judging"]
+    warned, t_s = np.asarray(judged["flagged"], float), np.asarray(judged["t_s"], float)
+    row = np.searchsorted(t_s, np.asarray(estimate["t_s"], float), side="right") - 1
+    standing = warned[np.clip(row, 0, len(warned) - 1)] > 0.0  # warnings are our own filter's
+    return estimate_scores(estimate, known, record.manifest["duration_s"], standing)
+
+
+def estimate_scores(
+    estimate: Estimate, known: References, duration_s: float, warned: NDArray[np.bool_]
+) -> dict[str, Any]:
+    """Errors of an estimate against what is known of its log. warned: at which of its instants a warning stands."""
+    motion, levels = motion_of(estimate), None
+    if set(PROTECTION_LEVELS) <= estimate.keys():  # else it states none
+        truth = None if known.truth is None else truth_motion(known.truth, known.heading)
+        drift = None if truth is None else drift_of(motion, truth, known.flight_s)
+        t_s = np.asarray(estimate["t_s"], float)
+        levels = protection_of(t_s, columns_of(estimate, PROTECTION_LEVELS), warned, drift)
     return {
-        "duration_s": record.manifest["duration_s"],
+        "duration_s": duration_s,
         **path_scores(estimate, known),
-        "end_drift_m": end_drift_of(motion_of(estimate), known),
-        "protection": _protection(record, estimate, known),
+        "end_drift_m": end_drift_of(motion, known),
+        "protection": levels,
     }
 
 
@@ -161,19 +177,6 @@ def _readings(record: Record, sensor: Sensor) -> tuple[Array, Array] | None:
     return None if table is None else (np.asarray(table["t_s"], float), columns_of(table, COLUMNS[sensor]))
 
 
-def _protection(record: Record, estimate: Estimate, known: References) -> dict[str, Any] | None:
-    """Protection levels against errors; None of an estimate that states no levels. Warnings are our own filter's."""
-    if not set(PROTECTION_LEVELS) <= estimate.keys():
-        return None
-    t_s, judged = np.asarray(estimate["t_s"], float), record.tables["judging"]
-    warned = np.asarray(judged["flagged"], float)
-    row = np.clip(np.searchsorted(np.asarray(judged["t_s"], float), t_s, side="right") - 1, 0, len(warned) - 1)
-    drift = None
-    if known.truth is not None:
-        drift = drift_of(motion_of(estimate), truth_motion(known.truth, known.heading), known.flight_s)
-    return protection_of(t_s, columns_of(estimate, PROTECTION_LEVELS), warned[row] > 0.0, drift)
-
-
 def consistency_in(record: Record) -> dict[str, dict[str, Any]]:
     """By sensor, whether the innovations of the components that were tested are as large as the filter states."""
     table = record.tables.get("innovation")
@@ -182,13 +185,7 @@ def consistency_in(record: Record) -> dict[str, dict[str, Any]]:
     sensor, tested = np.asarray(table["sensor"], str), np.isin(np.asarray(table["reason"], str), TESTED)
     component = np.unique(np.asarray(table["component"], str), return_inverse=True)[1]
     news, variance = (np.asarray(table[name], float) for name in ("innovation", "innovation_variance"))
-    found = {}
-    for each in Sensor:
-        rows = tested & (sensor == each.name.lower())
-        judged = consistency_of(component[rows], news[rows], variance[rows])
-        if judged is not None:
-            found[each.name.lower()] = judged._asdict()
-    return found
+    return consistency_by_sensor(lambda each: tested & (sensor == each.name.lower()), component, news, variance)
 
 
 class PhaseScores(NamedTuple):

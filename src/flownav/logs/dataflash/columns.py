@@ -197,6 +197,14 @@ def _scaled(values: NDArray[Any], factor: float) -> Array:
         return np.asarray(values.astype(float) * factor)
 
 
+def good_rows(log: DataFlash, name: str, fields: Sequence[Field]) -> CsvTable | None:
+    """The checked rows of a kind of message; None where it has none. InputError as `check_rows`."""
+    table = message_rows(log, name, fields)
+    if table is not None:
+        check_rows(table, fields)
+    return table if table is not None and len(table.t_s) else None
+
+
 def check_rows(table: CsvTable, fields: Sequence[Field]) -> None:
     """Throw away and count what is not finite, out of range or out of order. InputError where the clock restarts."""
     check_finite(table, [Column(f.label, f.low, f.high, may_be_empty=f.may_be_nan) for f in fields])

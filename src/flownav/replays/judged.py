@@ -90,10 +90,12 @@ def obstacles(log: Log) -> list[str]:
 
 def consistency_scores(innovation: Array) -> dict[str, dict[str, Any]]:
     """By sensor, of the components that were held against their prediction; innovation: rows of a tape's."""
-    tested = InnovationRow.of(innovation[np.isin(InnovationRow.of(innovation).reason, TESTED)])
+    offered = InnovationRow.of(innovation)
+    tested = np.isin(offered.reason, TESTED)
     return consistency_by_sensor(
-        lambda sensor: tested.sensor == sensor, tested.component, tested.innovation, tested.innovation_variance
-    )
+        lambda sensor: tested & (offered.sensor == sensor),
+        offered.component, offered.innovation, offered.innovation_variance,
+    )  # fmt: skip
 
 
 def told(innovation: Array) -> Array:

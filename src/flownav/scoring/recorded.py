@@ -140,18 +140,18 @@ def estimate_scores(
     estimate: Estimate, known: References, duration_s: float, warned: NDArray[np.bool_]
 ) -> dict[str, Any]:
     """Errors of an estimate against what is known of its log. warned: at which of its instants a warning stands."""
-    motion, levels = motion_of(estimate), None
-    if set(PROTECTION_LEVELS) <= estimate.keys():  # else it states none
-        truth = None if known.truth is None else truth_motion(known.truth, known.heading)
-        drift = None if truth is None else drift_of(motion, truth, known.flight_s)
-        t_s = np.asarray(estimate["t_s"], float)
-        levels = protection_of(t_s, columns_of(estimate, PROTECTION_LEVELS), warned, drift)
-    return {
+    scores: dict[str, Any] = {
         "duration_s": duration_s,
         **path_scores(estimate, known),
-        "end_drift_m": end_drift_of(motion, known),
-        "protection": levels,
+        "end_drift_m": end_drift_of(motion_of(estimate), known),
+        "protection": None,
     }
+    if set(PROTECTION_LEVELS) <= estimate.keys():  # else it states none
+        truth = None if known.truth is None else truth_motion(known.truth, known.heading)
+        drift = None if truth is None else drift_of(motion_of(estimate), truth, known.flight_s)
+        t_s = np.asarray(estimate["t_s"], float)
+        scores["protection"] = protection_of(t_s, columns_of(estimate, PROTECTION_LEVELS), warned, drift)
+    return scores
 
 
 def references_in(record: Record) -> References:

@@ -9,15 +9,15 @@ import pytest
 from typer.testing import CliRunner
 
 from command import printed
-from flownav.campaigns.ablations import (
+from flownav.campaigns.accuracy import CASES, Target, flights_of, scenario_of
+from flownav.campaigns.judged import (
     ablations,
     ageless,
     constant_flow_noise,
+    fly_judged,
     without_compass_states,
     without_gps_states,
 )
-from flownav.campaigns.accuracy import CASES, Target, flights_of, scenario_of
-from flownav.campaigns.judged import fly_judged
 from flownav.campaigns.local import fly_many, home_epoch, known_exactly
 from flownav.cli import app
 from flownav.core.errors import InputError, VerdictError

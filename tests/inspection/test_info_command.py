@@ -12,7 +12,7 @@ import typer
 from typer.testing import CliRunner
 
 from command import printed
-from flownav.cli import identify, info
+from flownav.cli import identify
 from flownav.cli import replay as replay_command
 from flownav.core.errors import InputError
 from flownav.core.frames import quaternion_from_euler
@@ -54,7 +54,7 @@ def call(command, *arguments):
 
 
 def facts_of(path: Path, *options) -> dict:
-    result = call(info.command, path, *options, "--json")
+    result = call(replay_command.info, path, *options, "--json")
     assert result.exception is None, result.exception
     return json.loads(result.stdout, parse_constant=pytest.fail)  # no NaN, no Infinity
 
@@ -120,7 +120,7 @@ def test_the_verdict_stands_in_words(ulog):
     assert facts["verdict"].startswith("flow and GPS agree: lag 0.2")
     assert facts["agreement"]["scale"] == pytest.approx(1.0, abs=0.02)
     assert facts["agreement"]["correlation"] > 0.98
-    assert f"Verdict: {facts['verdict']}" in call(info.command, ulog).stdout
+    assert f"Verdict: {facts['verdict']}" in call(replay_command.info, ulog).stdout
 
 
 def indoors(flown, folder, *, sign=1.0, sonar=False, truth=True):
@@ -174,12 +174,12 @@ def test_a_slow_imu_alone_cannot_be_replayed_and_info_says_why(flown, tmp_path):
     facts = facts_of(replace(flown, tables=tables).write(tmp_path / "slow"))
     assert facts["replayable"] is False
     assert facts["obstacles"] == ["no attitude, and its IMU has 5.0 Hz: one of them is needed, an IMU of 20 Hz or more"]
-    shown = call(info.command, tmp_path / "slow").stdout
+    shown = call(replay_command.info, tmp_path / "slow").stdout
     assert "Cannot be replayed: no attitude" in shown
 
 
 def test_people_see_the_same(ulog):
-    result = call(info.command, ulog)
+    result = call(replay_command.info, ulog)
     assert result.exception is None
     for said in ("garden.ulg: 40.0 s", "flow_rate", "Clock: nothing found", "Stated limits of range_m: 0.1 to 12",
                  "The autopilot's own estimate: PX4 EKF2", "against GPS"):  # fmt: skip
@@ -202,7 +202,7 @@ def test_what_is_wrong_and_missing_is_said(flown, tmp_path):
     assert [absence["what"] for absence in facts["absences"]] == ["no inertial readings"]
     assert len(facts["clock"]) == 1
     assert facts["clock"][0].startswith("range: 1 gaps, 5.")
-    shown = call(info.command, path).stdout
+    shown = call(replay_command.info, path).stdout
     assert "Warning: flow sign is inverted" in shown
     assert "no inertial readings" in shown
 

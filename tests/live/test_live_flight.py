@@ -183,7 +183,7 @@ def test_a_replay_of_the_record_is_the_same_bits(flight):
     record = assert_same_bits(flight[3])
     assert {"fed", "truth", "imu", "flow_rate", "gps_position", "range"} <= set(record.tables)
     assert record.manifest["kind"] == "live"
-    assert replayed(flight[3]).truth_scores()["velocity_rms_m_s"] < 0.3
+    assert replayed(flight[3]).scores()["truth"]["velocity_rms_m_s"] < 0.3
 
 
 def test_the_screen_shows_rates_ages_and_the_estimate(flight):

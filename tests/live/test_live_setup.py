@@ -28,8 +28,7 @@ from flownav.live.setup.check import check
 from flownav.live.setup.compare import baud_of
 from flownav.live.setup.knowledge import MAKES, knowledge_of
 from flownav.live.setup.talk import TRIES, Talk, read
-from flownav.logs.mavlink.framing import coder, dialect
-from flownav.logs.mavlink.parameters import INTEGERS, Value, decoded, name_of, set_value
+from flownav.logs.mavlink.framing import INTEGERS, Value, coder, decoded, dialect, name_of, set_value
 from recorded_link import frames_of
 
 UDP = parse_url("udp:14550")

@@ -12,8 +12,7 @@ from fed_records import queue_of_flight, record_of
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
 from flownav.export.formats import export
-from flownav.logs.frames import frd, ned, ned_from_frd, ned_from_frd_of_nwu
-from flownav.logs.log import Log
+from flownav.logs.log import Log, frd, ned, ned_from_frd, ned_from_frd_of_nwu
 from flownav.logs.open_log import log_kind, open_flight, open_log
 from flownav.logs.ros.bag import Bag
 from flownav.logs.ros.containers import messages

@@ -126,8 +126,8 @@ def test_a_flow_scale_is_learned_while_there_is_gps(log, flight):
 
 
 def test_a_wrong_gps_delay_shows_as_speed_times_the_difference(log, flight):
-    right = flown(log).velocity_rms()
-    late = flown(log, gps_delay_s=0.72).velocity_rms()
+    right = flown(log).scores()["velocity_rms_m_s"]
+    late = flown(log, gps_delay_s=0.72).scores()["velocity_rms_m_s"]
     assert right is not None
     assert late is not None
     assert right < 0.01
@@ -413,7 +413,7 @@ def test_truth_is_turned_onto_the_estimate(log, flight):
     truth = {"t_s": t_s, "pos_n_m": np.cos(turn) * north + np.sin(turn) * east + 5.0,
              "pos_e_m": -np.sin(turn) * north + np.cos(turn) * east - 3.0, "pos_d_m": down + 1.0}  # fmt: skip
     run = flown(altered(log, truth=truth))
-    scores = run.truth_scores()
+    scores = run.scores()["truth"]
     assert scores is not None
     assert scores["yaw_rad"] == pytest.approx(turn, abs=1e-3)
     assert scores["horizontal_rms_m"] < 0.01

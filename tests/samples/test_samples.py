@@ -75,7 +75,7 @@ def test_every_format_replays_to_the_same_flight(replays):
 
 
 def _rms(flown: Replay, name: str) -> float:
-    scores = flown.truth_scores()
+    scores = flown.scores()["truth"]
     assert scores is not None
     return float(scores[name])
 

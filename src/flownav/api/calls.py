@@ -28,7 +28,8 @@ def call_of(name: str, *arguments: Any, **options: Any) -> str:
     Options that stand as the function has them unless told otherwise are left out by `changed`.
     """
     given = [_shown(argument) for argument in arguments]
-    said = {key: value for key, value in options.items() if value is not None and _is_said(value)}
+    empty = {key for key, value in options.items() if isinstance(value, tuple | list | dict) and not value}
+    said = {key: value for key, value in options.items() if value is not None and key not in empty}
     given += [f"{key}={_shown(value)}" for key, value in said.items() if key.isidentifier()]
     dotted = {key: value for key, value in said.items() if not key.isidentifier()}
     given += [f"**{_shown(dotted)}"] if dotted else []
@@ -38,15 +39,8 @@ def call_of(name: str, *arguments: Any, **options: Any) -> str:
 def changed(function: Callable[..., Any], options: Mapping[str, Any]) -> dict[str, Any]:
     """The options that differ from the function's defaults."""
     defaults = {name: parameter.default for name, parameter in inspect.signature(function).parameters.items()}
-    return {name: value for name, value in options.items() if not _same(value, defaults.get(name))}
-
-
-def _same(value: Any, default: Any) -> bool:
-    return type(value) is type(default) and repr(value) == repr(default)
-
-
-def _is_said(value: Any) -> bool:
-    return not (isinstance(value, tuple | list | dict) and not value)
+    shown = {name: (type(value), repr(value)) for name, value in defaults.items()}
+    return {name: value for name, value in options.items() if (type(value), repr(value)) != shown.get(name)}
 
 
 def _shown(value: Any) -> str:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from flownav.campaigns.device_flight import TAPE_COUNTS, fly_navigated_flight, fly_paper_flight, take_here
-from flownav.campaigns.engines import Part, neighbours
+from flownav.campaigns.engines import Part, into_parts, neighbours
 from flownav.campaigns.local import home_epoch
 from flownav.campaigns.plan import Ready, ready_of
 from flownav.core.compile import ONE_LANE, WARP, NoDeviceError, Runner, announce_compilation, device_runner
@@ -111,15 +111,9 @@ class Cuda:
         asked = sum(part.flights for part in parts)
         with truths_of_cell(cell, seed, asked, self._processes) as truths:
             for together in neighbours(parts):
-                waiting, held = list(together), np.empty((0, RUNNING_COLUMNS))
                 total = sum(part.flights for part in together)
-                for rows in self.rows(cell.flight, seed, together[0].first, total, truths):
-                    on_progress(len(rows))
-                    held = np.concatenate([held, rows])
-                    while waiting and len(held) >= waiting[0].flights:
-                        part = waiting.pop(0)
-                        yield part, held[: part.flights]
-                        held = held[part.flights :]
+                rows = self.rows(cell.flight, seed, together[0].first, total, truths)
+                yield from into_parts(together, rows, on_progress)
 
     def rows(self, flight: Flight, seed: int, first: int, flights: int, truths: Truths) -> Iterator[Array]:
         """The rows of so many flights from number `first` on, (flights, RUNNING_COLUMNS), as many as fit at a time."""

@@ -8,7 +8,7 @@ import logging
 import os
 import secrets
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple, Protocol
 
@@ -63,29 +63,35 @@ class Local:
     def _without_pause(
         self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object]
     ) -> Iterator[tuple[Part, Array]]:
-        flight, waiting = cell.flight, list(parts)
-        held: list[Array] = []
-        total = sum(part.flights for part in parts)
+        flight, total = cell.flight, sum(part.flights for part in parts)
 
         def judge(history: Array) -> Array:
             self.check(flight, history)
             return rows_of(flight, history)
 
-        have = 0
         first, fault = parts[0].first, cell.faults(seed)
 
         def instead(start: int) -> Instead:
             numbers = range(first + start, first + start + len(LANES))
             return Instead(faults=fault and [fault(number) for number in numbers], take=self.instead)
 
-        for flown, block in fly_blocks(flight, seed, first, total, judge, self.threads, cell.ensemble, instead):
-            held.append(block)
-            have += flown
-            on_progress(flown)
-            while waiting and have >= waiting[0].flights:
-                part, rows = waiting.pop(0), np.concatenate(held)
-                held, have = [rows[part.flights :]], have - part.flights
-                yield part, rows[: part.flights]
+        blocks = fly_blocks(flight, seed, first, total, judge, self.threads, cell.ensemble, instead)
+        yield from into_parts(parts, (block for _, block in blocks), on_progress)
+
+
+def into_parts(
+    parts: Sequence[Part], blocks: Iterable[Array], on_progress: Callable[[int], object]
+) -> Iterator[tuple[Part, Array]]:
+    """The rows of each part, from blocks of rows in order, told as they come."""
+    waiting, held, have = list(parts), list[Array](), 0
+    for block in blocks:
+        held.append(block)
+        have += len(block)
+        on_progress(len(block))
+        while waiting and have >= waiting[0].flights:
+            part, rows = waiting.pop(0), np.concatenate(held)
+            held, have = [rows[part.flights :]], have - part.flights
+            yield part, rows[: part.flights]
 
 
 def neighbours(parts: Sequence[Part]) -> Iterator[list[Part]]:

@@ -85,17 +85,15 @@ def rank(entries: Mapping[str, Distribution], seed: int, n: int, fly: Fly) -> Ra
 
     a, b = crossed(), crossed(*names, NOISE)
     inputs = (*names, NOISE)
-    groups = {known: [name for name in inputs if class_of(name, entries) == known] for known in CLASSES}
+    groups = {
+        known: [name for name in inputs if ("never" if name == NOISE else entries[name].known) == known]
+        for known in CLASSES
+    }
     found = [crossed(name) for name in inputs] + [crossed(*group) for group in groups.values()]
     (a, b, *swapped), of = bounded([a, b, *found])
     indices = indices_of(a, b, np.array(swapped), (*inputs, *groups), seed)
     ranked = sorted(indices[: len(inputs)], key=lambda index: -index.total)
     return Ranking(tuple(ranked), tuple(indices[len(inputs) :]), n, n * (2 + len(swapped)), of)
-
-
-def class_of(name: str, entries: Mapping[str, Distribution]) -> str:
-    """Who could know an input; nobody the noise."""
-    return "never" if name == NOISE else entries[name].known
 
 
 def flights_of(inputs: int, n: int) -> int:

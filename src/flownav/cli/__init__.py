@@ -18,7 +18,8 @@ DONE, BAD_VERDICT, BAD_INPUT = 0, 1, 2  # Ctrl-C: 130, as shells have it
 ELSEWHERE = {
     "report": ("records", "report"), "view": ("records", "view"), "export": ("records", "export_to"),
     "recover": ("records", "recover"), "schema": ("bench", "schema"), "tune": ("compare", "tune_settings"),
-    "sample": ("rig", "sample"),
+    "sample": ("rig", "sample"), "info": ("replay", "info"), "flow": ("identify", "flow"),
+    "validate": ("paper", "validate"), "envelope": ("campaign", "envelope"),
 }  # fmt: skip
 # options that are not called as the argument in Python is, without its unit
 OPTIONS = {

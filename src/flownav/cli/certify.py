@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from flownav.cli import options
 from flownav.cli.options import argument, option, out_option, switch
-from flownav.cli.tables import Column, answer, figure, say, table_of
-from flownav.core.errors import InputError
+from flownav.cli.output import Column, answer, figure, progress, require_between, say, table_of
+from flownav.core.errors import InputError, VerdictError
 
 if TYPE_CHECKING:
     from flownav.campaigns.engines import Engine
@@ -54,8 +54,6 @@ def command(
     from flownav.campaigns.ranking import LEAST_ROWS
     from flownav.campaigns.requirement import load_requirement
     from flownav.campaigns.run import engine_named, require_engine
-    from flownav.cli.output import require_between
-    from flownav.core.errors import VerdictError
 
     if flights is not None:
         require_between("--flights", flights, 1, 100_000_000)
@@ -86,7 +84,6 @@ def _fly(
     from flownav.campaigns.ranking import flights_of
     from flownav.campaigns.store import Store
     from flownav.cli.campaign_said import watching
-    from flownav.cli.output import progress
 
     inputs = max(len(cell.setup.ensemble().entries) for cell in plan.cells)
     require_planned(plan, folder)

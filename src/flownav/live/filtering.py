@@ -11,7 +11,7 @@ from flownav.core.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sen
 from flownav.estimation.states import POSITION, STATE
 from flownav.live.horizon import Waiting
 from flownav.live.options import Options
-from flownav.logs.frames import attitude_rates, mean_over
+from flownav.logs.log import attitude_rates, mean_over
 from flownav.logs.mavlink.messages import TrueState
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import Running, run, start_navigator

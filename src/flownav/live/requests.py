@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 
 from flownav.live.rates import Rates, Streams
 from flownav.live.reception import Vehicle
-from flownav.logs.mavlink.framing import ARDUPILOT, PX4, Message
-from flownav.logs.mavlink.parameters import name_of, request_read
+from flownav.logs.mavlink.framing import ARDUPILOT, PX4, Message, name_of, request_read
 
 HIL_FLAG = 32  # MAV_MODE_FLAG_HIL_ENABLED
 OF_A_SIMULATOR = "SIM_SPEEDUP"

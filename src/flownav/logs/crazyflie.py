@@ -33,8 +33,7 @@ from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, Table
 from flownav.logs.assembly import MOST_BYTES, content_of, counted, pressure_altitude_m, sensor_stream, sha256_of
-from flownav.logs.frames import frd, ned_from_frd_of_nwu, state_table
-from flownav.logs.log import Log, absences_of
+from flownav.logs.log import Log, absences_of, frd, ned_from_frd_of_nwu, state_table
 from flownav.logs.plausible import of_one_clock
 
 MAGIC = 0xBC

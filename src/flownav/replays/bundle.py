@@ -13,8 +13,7 @@ from flownav.core.frames import rotation_from_quaternion
 from flownav.core.measurement import COLUMNS, Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.estimation.gating import Reason
-from flownav.logs.frames import attitude_at
-from flownav.logs.log import Log
+from flownav.logs.log import Log, attitude_at
 from flownav.navigation.flags import flagged, flags_of
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tables import estimate_table, happenings, innovation_table, states_table

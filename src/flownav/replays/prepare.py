@@ -14,8 +14,7 @@ import numpy as np
 from flownav.core.compile import kernel
 from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array, EventQueue, Sensor, Stream, merge, merged_parts
-from flownav.logs.frames import attitude_rates, mean_over
-from flownav.logs.log import Log
+from flownav.logs.log import Log, attitude_rates, mean_over
 from flownav.navigation.feed import imu_serves
 from flownav.navigation.spikes import Witness
 from flownav.navigation.told import NO_STATED_NOISE, FlowNoise

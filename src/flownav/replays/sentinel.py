@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from flownav.core.frames import rotation_from_quaternion, velocity_from_flow
 from flownav.core.measurement import COLUMNS, Array, Sensor, Stream
-from flownav.logs.frames import attitude_at, mean_over
+from flownav.logs.log import attitude_at, mean_over
 
 # Chosen so that nothing is said of quad-px4flow-outdoor, whole or in any part of 30 to 120 s, and each of its twelve
 # spoilt copies is found out (test_replay_sentinel). Halving or doubling any one of them changes no verdict on nine such

@@ -15,7 +15,7 @@ import numpy as np
 
 from flownav.core.measurement import Array
 from flownav.report.chart import CROSS_POINTS, DOT_POINTS, LINE_POINTS, Chart, Series, thin, thin_dots
-from flownav.report.figures_path import Paths, drawn_rows
+from flownav.report.figures_states import Paths, drawn_rows
 from flownav.report.panels import Section
 
 DECIMALS = 6  # decimal places below the leading one of a column's largest value

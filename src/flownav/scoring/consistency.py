@@ -10,14 +10,14 @@ Sums, not flights, are kept: memory does not grow with the number of flights.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.measurement import Array
+from flownav.core.measurement import Array, Sensor
 from flownav.scoring.errors import STATES
 
 SCORED = 6  # position and velocity, the degrees of freedom of a normalised error squared
@@ -107,7 +107,7 @@ class InnovationConsistency(NamedTuple):
     white: bool
 
 
-def consistency_of(component: Array, innovation: Array, variance: Array) -> InnovationConsistency | None:
+def consistency_of(component: NDArray[Any], innovation: Array, variance: Array) -> InnovationConsistency | None:
     """Consistency of one sensor's tested components in order of time, (n,) each; None where none was tested.
 
     component: which of the sensor's values; each is held against the one before of its own kind. variance: of the
@@ -120,6 +120,19 @@ def consistency_of(component: Array, innovation: Array, variance: Array) -> Inno
     normal, kind = innovation[known] / np.sqrt(variance[known]), component[known]
     white = all(is_white(normal[kind == one]) for one in np.unique(kind))
     return InnovationConsistency(found.mean, found.tested, white)
+
+
+def consistency_by_sensor(
+    rows_of: Callable[[Sensor], NDArray[np.bool_]], component: NDArray[Any], innovation: Array, variance: Array
+) -> dict[str, dict[str, Any]]:
+    """The consistency of each sensor that has tested components, by its name. rows_of: which rows are a sensor's."""
+    found = {}
+    for sensor in Sensor:
+        rows = rows_of(sensor)
+        judged = consistency_of(component[rows], innovation[rows], variance[rows])
+        if judged is not None:
+            found[sensor.name.lower()] = judged._asdict()
+    return found
 
 
 def is_white(normalised: Array) -> bool:

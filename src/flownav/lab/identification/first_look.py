@@ -10,8 +10,7 @@ import numpy as np
 from flownav.core.measurement import Array, Sensor
 from flownav.lab.identification import reference_motion
 from flownav.lab.identification.flight import IMU_NAME, Flight, flight
-from flownav.logs.frames import mean_over
-from flownav.logs.log import Log
+from flownav.logs.log import Log, mean_over
 
 CLEAR_RATIO = 2.0  # the best assignment must explain this much more than the next
 

@@ -21,8 +21,7 @@ from flownav.core.errors import InputError, arg
 from flownav.core.frames import GRAVITY_M_S2 as GRAVITY_M_S2
 from flownav.core.frames import rotation_from_quaternion, velocity_from_flow
 from flownav.core.measurement import Array, Sensor, Stream
-from flownav.logs.frames import attitude_at
-from flownav.logs.log import Log
+from flownav.logs.log import Log, attitude_at
 from flownav.replays.bundle import turned_sensor, with_attitude
 from flownav.replays.judged import flying_at
 from flownav.replays.prepare import ReplayOptions, prepare

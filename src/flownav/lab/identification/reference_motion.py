@@ -18,7 +18,7 @@ from flownav.lab.identification.experiment import Experiment, experiment
 from flownav.lab.identification.flight import GRAVITY_M_S2, Flight
 from flownav.lab.identification.output_error import Z_95, fit
 from flownav.lab.identification.quantities import Interval, latency
-from flownav.logs.frames import mean_over
+from flownav.logs.log import mean_over
 
 GRID_S = 0.02
 SPLIT_S = 1.0

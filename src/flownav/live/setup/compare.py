@@ -6,7 +6,7 @@ The port that we speak over is found by its baud rate.
 from typing import NamedTuple
 
 from flownav.live.setup.knowledge import SETS, Arming, Knowledge, Wanted
-from flownav.logs.mavlink.parameters import Value
+from flownav.logs.mavlink.framing import Value
 
 ARDUPILOT_PORTS = range(1, 8)
 MAVLINK_PROTOCOLS = (1, 2)

@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 
 from flownav.live.link import Link, waited
 from flownav.live.reception import Reception, Vehicle
-from flownav.logs.mavlink.framing import Message, coder
+from flownav.logs.mavlink.framing import Message, Value, coder, decoded, encoded, name_of, request_read, set_value
 from flownav.logs.mavlink.outgoing import ODOMETRY_COMPONENT, companion_heartbeat
-from flownav.logs.mavlink.parameters import Value, decoded, encoded, name_of, request_read, set_value
 from flownav.logs.mavlink.signing import sign_outgoing
 
 ARMED_FLAG = 128  # MAV_MODE_FLAG_SAFETY_ARMED

@@ -23,8 +23,7 @@ from flownav.core.record import Table
 from flownav.logs.assembly import MOST_BYTES, Origin, content_of, gps_streams, sensor_stream, sha256_of
 from flownav.logs.blackbox.format import Header, headers
 from flownav.logs.blackbox.frames import Frames, read_frames
-from flownav.logs.frames import frd, ned_from_frd_of_nwu, state_table
-from flownav.logs.log import Log, absences_of
+from flownav.logs.log import Log, absences_of, frd, ned_from_frd_of_nwu, state_table
 from flownav.logs.plausible import of_one_clock
 
 US, CM, DEG_E7, DECIDEGREE = 1e-6, 1e-2, 1e-7, 0.1
@@ -216,7 +215,7 @@ def _estimate(frames: Frames, t_s: Array, attitude: Stream | None) -> Table | No
     up_is_down = np.array([1.0, 1.0, -1.0])
     turned = None
     if attitude is not None and len(attitude) > 1:
-        from flownav.logs.frames import attitude_at
+        from flownav.logs.log import attitude_at
 
         turned = attitude_at(attitude, t_s[rows])
     return state_table(t_s[rows], CM * place[rows] * up_is_down, CM * speed[rows] * up_is_down, turned)

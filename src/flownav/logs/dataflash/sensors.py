@@ -17,7 +17,7 @@ from flownav.core.measurement import Array, Sensor, Stream
 from flownav.logs.assembly import Origin, local_ned, near_the_rest
 from flownav.logs.csv_table import CsvTable
 from flownav.logs.dataflash.columns import DataFlash, Field, check_rows, message_rows
-from flownav.logs.frames import attitude_at
+from flownav.logs.log import attitude_at
 
 GYRO_LIMIT_RAD_S = 70.0  # twice the range of a 2000 deg/s gyro
 RANGE_GOOD, FACING_DOWN = 4, 25  # RangeFinder::Status::Good, ROTATION_PITCH_270

@@ -8,9 +8,9 @@ import numpy as np
 from flownav.core.measurement import Array
 from flownav.core.record import POSITION_NED, VELOCITY_BODY, Record
 from flownav.core.text import finite_or_none
-from flownav.scoring.by_phase import errors_of
-from flownav.scoring.percentiles import CONFIDENCE, Difference, mean_difference
+from flownav.scoring.landings import CONFIDENCE, Difference, mean_difference
 from flownav.scoring.phases import phases_of
+from flownav.scoring.recorded import errors_of
 
 Row = dict[str, Any]
 MEASURES = ("horizontal_m", "vertical_m", "velocity_m_s")

@@ -11,8 +11,7 @@ from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import VELOCITY_BODY
 from flownav.lab.identification.first_look import IN_PART, Look, first_look
 from flownav.lab.identification.flight import jumps
-from flownav.logs.frames import attitude_at
-from flownav.logs.log import Log
+from flownav.logs.log import Log, attitude_at
 from flownav.logs.plausible import check_plausible
 from flownav.replays.judged import autopilot_scores, flying_at, obstacles
 from flownav.replays.prepare import ReplayOptions, prepare

@@ -13,7 +13,7 @@ from flownav.cli.output import emit
 from flownav.cli.tables import Column, answer, say, table_of
 
 if TYPE_CHECKING:
-    from flownav.export.samples.writing import Written
+    from flownav.export.samples.kinds import Written
     from flownav.lab.rig.experiment import RigLog, RigSettings
 
 HEIGHTS_M = ["0.6"]
@@ -74,8 +74,7 @@ def _swung(settings: RigSettings, heights_m: list[float], folder: Path) -> list[
     from flownav.cli.output import progress
     from flownav.core.compile import announce_compilation
     from flownav.core.provenance import command_line
-    from flownav.lab.rig.experiment import run_campaign
-    from flownav.lab.rig.log_folder import check_rig_folder, run_folders, write_rig_folder
+    from flownav.lab.rig.experiment import check_rig_folder, run_campaign, run_folders, write_rig_folder
 
     count = len(heights_m) * settings.runs
     rows, folders = [], list(run_folders(folder, count))
@@ -117,8 +116,7 @@ def sample(
 
     from flownav.core.errors import InputError
     from flownav.export.samples.kinds import SAMPLES as MADE
-    from flownav.export.samples.kinds import sample_of
-    from flownav.export.samples.writing import write_samples
+    from flownav.export.samples.kinds import sample_of, write_samples
 
     folder = out or Path("samples")
     asked = [sample_of(kind) for kind in (words("KIND", kinds) if kinds else [])]

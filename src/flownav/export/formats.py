@@ -84,7 +84,7 @@ def export(
 
         return Written(*write_poses(record, path, frame or "ned"))
     if to in FOLDERS:
-        from flownav.export.tables import write_csv, write_parquet
+        from flownav.export.trajectory import write_csv, write_parquet
 
         return Written(*(write_csv if to == "csv" else write_parquet)(record, path))
     if to == "mcap":

@@ -20,8 +20,19 @@ from flownav.core.errors import InputError
 from flownav.core.guard import written_whole
 from flownav.core.record import Column, Record, Table
 from flownav.core.version import __version__
-from flownav.export.tables import Stamps, finite_rows, is_text, manifest_json, shift_needed_s, stamps, texts
-from flownav.export.trajectory import ENU_FROM_NED, Trajectory, error_table, trajectories
+from flownav.export.trajectory import (
+    ENU_FROM_NED,
+    Stamps,
+    Trajectory,
+    error_table,
+    finite_rows,
+    is_text,
+    manifest_json,
+    shift_needed_s,
+    stamps,
+    texts,
+    trajectories,
+)
 
 Schema = dict[str, Any]
 

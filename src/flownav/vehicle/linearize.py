@@ -29,11 +29,10 @@ from flownav.core.frames import rotation_from_quaternion, to_earth
 from flownav.core.measurement import Array
 from flownav.core.parameter_files import Number, ParameterModel, load, shipped
 from flownav.vehicle import airframe, helicopter, multirotor
-from flownav.vehicle.around import CALM
 from flownav.vehicle.complex_step import jacobian
 from flownav.vehicle.kinds import AnyState, AnyTrim, AnyVehicle
 from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters, with_inflow_held, without_slop
-from flownav.vehicle.state import Controls, HelicopterState, Inflow
+from flownav.vehicle.state import CALM, Controls, HelicopterState, Inflow
 from flownav.vehicle.trim import Trim, is_hexa
 
 STATES = ("x", "y", "z", "u", "v", "w")

@@ -126,7 +126,7 @@ def vehicles(flights: int) -> list[Figure]:
 # -- the filters' steps --------------------------------------------------------------------------------------
 def filter_parts() -> list[Figure]:
     """Prediction, correction, and one that nobody offers, of the navigator's filter: scalar, and a lane of sixteen."""
-    from flownav.studies.benchmark.filters import SETTINGS, correct_often, offer_nothing, predict_often, standing
+    from flownav.studies.benchmark.vehicles import SETTINGS, correct_often, offer_nothing, predict_often, standing
 
     def us_of(part: Callable[..., Any], lanes: tuple[int, ...]) -> float:
         start = standing(lanes)
@@ -152,7 +152,7 @@ def filter_parts() -> list[Figure]:
 
 def _filter_runner() -> Callable[[int], float]:
     """Seconds for n predict+update steps of the paper's filter on one lane."""
-    from flownav.studies.benchmark.filters import PAPER_ROWS, run_paper_filter
+    from flownav.studies.benchmark.vehicles import PAPER_ROWS, run_paper_filter
 
     model = _papers_model()
     work = np.zeros(PAPER_ROWS)

@@ -1,4 +1,4 @@
-"""A log in figures: its streams, its clock, its limits, what its sensors say of each other, what it lacks."""
+"""Inspection: a log in figures: its streams, clock, limits, what its sensors say of each other, what it lacks."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -56,15 +56,9 @@ POSE_IN_FRAME = _object(
     {"timestamp": TIME, "frame_id": TEXT, "pose": _object({"position": VECTOR, "orientation": QUATERNION})},
     "foxglove.PoseInFrame",
 )
+TRANSFORM = ("timestamp", "parent_frame_id", "child_frame_id", "translation", "rotation")
 FRAME_TRANSFORM = _object(
-    {
-        "timestamp": TIME,
-        "parent_frame_id": TEXT,
-        "child_frame_id": TEXT,
-        "translation": VECTOR,
-        "rotation": QUATERNION,
-    },
-    "foxglove.FrameTransform",
+    dict(zip(TRANSFORM, (TIME, TEXT, TEXT, VECTOR, QUATERNION), strict=True)), "foxglove.FrameTransform"
 )
 _TYPES = {"f": "number", "i": "integer", "u": "integer", "b": "boolean"}
 
@@ -167,14 +161,8 @@ def _earth(time_ns: Stamps) -> Channel:
     return Channel("/tf", FRAME_TRANSFORM, time_ns, iter(rows))
 
 
-def _transform(time: Row, parent: str, child: str, translation: Row, rotation: Row) -> Row:
-    return {
-        "timestamp": time,
-        "parent_frame_id": parent,
-        "child_frame_id": child,
-        "translation": translation,
-        "rotation": rotation,
-    }
+def _transform(*values: Row | str) -> Row:
+    return dict(zip(TRANSFORM, values, strict=True))
 
 
 def _time(time_ns: int) -> Row:

@@ -101,7 +101,7 @@ FIGURES = {5: ("17", "Figure 18: velocity", "19 to 21", "26", "27"), 6: ("22", "
 def panels(flights: Flights) -> list[Panel]:
     """Everything the paper draws of a flight."""
     record, name = flights.record, flights.scenario
-    what = {"takeoff": "take-off"}.get(name, name)
+    what = flights.what
     position, velocity, zoomed, position_error, velocity_error = FIGURES[flights.table]
     errors = (
         ("position", position_error, figures_errors.position_error(record)),

@@ -188,9 +188,5 @@ def _of_range(log: Log) -> list[Finding]:
     if share < LEAST_JUMPING:
         return []
     largest = float(np.abs(np.diff(range_m)).max())
-    return [
-        Finding(
-            f"range jumps in {share:.0%} of its steps in flight, by up to {largest:.1f} m: velocities from flow and "
-            f"range are off by {doubt:.0%} or so"
-        )
-    ]
+    jumping = f"range jumps in {share:.0%} of its steps in flight, by up to {largest:.1f} m"
+    return [Finding(f"{jumping}: velocities from flow and range are off by {doubt:.0%} or so")]

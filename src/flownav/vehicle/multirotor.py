@@ -180,12 +180,7 @@ def derivative_at_roots(
         *airframe.linear_acceleration(velocity, rates, (total.x, total.y, total.z), vehicle.mass_kg),
         *quaternion_rate(state.qw, state.qx, state.qy, state.qz, state.p, state.q, state.r),
         *airframe.angular_acceleration(rates, (total.l, total.m, total.n), vehicle),
-        spins.one,
-        spins.two,
-        spins.three,
-        spins.four,
-        spins.five,
-        spins.six,
+        *spins,
         power / (vehicle.efficiency * voltage),
     )
 

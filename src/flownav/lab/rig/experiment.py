@@ -21,7 +21,7 @@ from flownav.core.errors import InputError
 from flownav.core.guard import an_output, an_output_folder, written_whole
 from flownav.core.measurement import Array
 from flownav.core.provenance import provenance
-from flownav.core.text import plain
+from flownav.core.text import to_toml
 from flownav.lab.optics.camera import Camera, exposed, light_named, refocused
 from flownav.lab.optics.firmware import firmware_named
 from flownav.lab.optics.pad import pad_named
@@ -225,39 +225,20 @@ def run_folders(folder: Path, count: int) -> Iterator[Path]:
 
 def _set_up(log: RigLog, command: str, *, dated: bool) -> str:
     s, made = log.settings, provenance()
-    entries: dict[str, Any] = {
-        "schema_version": SCHEMA_VERSION,
-        "pivot_height_m": log.rod_length_m + s.height_m,
-        "rod_length_m": log.rod_length_m,
-        "height_m": s.height_m,
-        "encoder_counts_per_revolution": COUNTS_PER_REVOLUTION,
-        "pad": s.pad,
-        "firmware": s.firmware,
-        "excitation": s.excitation,
-        "seed": s.seed,
-        "chain_delay_s": s.chain_delay_s,
-    }
-    origin = {
-        "source": "flownav rig, simulated from pixels",
-        "command": command,
-        "run": log.run,
-        "light": s.light,
-        "axis_along_swing": s.along,
-        "start_angle_rad": s.start_angle_rad,
-        "duration_s": s.duration_s,
-        "refocus": s.refocus,
-        "gyro_late_s": s.gyro_late_s,
-        "sonar_late_s": s.sonar_late_s,
-        "flownav": made["flownav"],
-    } | ({"written_utc": made["written_utc"]} if dated else {})
-    lines = [f"{key} = {_toml(value)}" for key, value in entries.items()]
-    return "\n".join([*lines, "", "[provenance]", *(f"{key} = {_toml(value)}" for key, value in origin.items())]) + "\n"
+    entries: dict[str, Any] = {"schema_version": SCHEMA_VERSION, "pivot_height_m": log.rod_length_m + s.height_m}
+    entries |= {"rod_length_m": log.rod_length_m, "height_m": s.height_m}
+    entries |= {"encoder_counts_per_revolution": COUNTS_PER_REVOLUTION}
+    entries |= {name: getattr(s, name) for name in ("pad", "firmware", "excitation", "seed", "chain_delay_s")}
+    origin: dict[str, Any] = {"source": "flownav rig, simulated from pixels", "command": command, "run": log.run}
+    origin |= {"light": s.light, "axis_along_swing": s.along}
+    told = ("start_angle_rad", "duration_s", "refocus", "gyro_late_s", "sonar_late_s")
+    origin |= {name: getattr(s, name) for name in told} | {"flownav": made["flownav"]}
+    origin |= {"written_utc": made["written_utc"]} if dated else {}
+    return to_toml(_rounded(entries) | {"provenance": _rounded(origin)})
 
 
-def _toml(value: object) -> str:
-    if isinstance(value, str):
-        return '"' + plain(value).replace("\\", "\\\\").replace('"', '\\"') + '"'
-    return repr(round(value, 9)) if isinstance(value, float) else str(value)
+def _rounded(entries: dict[str, Any]) -> dict[str, Any]:
+    return {key: round(value, 9) if isinstance(value, float) else value for key, value in entries.items()}
 
 
 def check_rig_folder(folder: Path) -> None:

@@ -215,13 +215,9 @@ def replay_of_recorded_flight() -> Iterator[Figure]:
 
 def _subprocess(arguments: list[str], environment: dict[str, str] | None = None) -> float:
     """Wall time [s] of a flownav command as a whole process."""
+    whole = {**os.environ, **(environment or {})}
     start = time.perf_counter()
-    subprocess.run(
-        [sys.executable, "-m", "flownav", *arguments],
-        check=True,
-        capture_output=True,
-        env={**os.environ, **(environment or {})},
-    )
+    subprocess.run([sys.executable, "-m", "flownav", *arguments], check=True, capture_output=True, env=whole)
     return time.perf_counter() - start
 
 

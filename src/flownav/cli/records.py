@@ -51,7 +51,7 @@ def view(
     """
     from flownav.cli.output import place
     from flownav.core.record import Record
-    from flownav.export.viewing.view import SUFFIX, has_display, show, write_rrd
+    from flownav.export.viewing import SUFFIX, has_display, show, write_rrd
 
     beside = out is None and not has_display()
     path = record.with_suffix(SUFFIX) if beside else out

@@ -15,7 +15,7 @@ from flownav.campaigns.plan import Plan, planned
 from flownav.campaigns.run import run_campaign
 from flownav.campaigns.store import PART, Store
 from flownav.simulation.scenario import load_scenario
-from flownav.studies.benchmark.figure import Figure
+from flownav.studies.benchmark import Figure
 
 ROUNDS = 3
 MEMORY_FLIGHTS = (1024, 10_000)

@@ -15,8 +15,8 @@ from flownav.core.compile import LANES, ONE_LANE
 from flownav.estimation.paper_filter import PaperModel
 from flownav.simulation.engine import fly_blocks, fly_one
 from flownav.simulation.plan import Flight
+from flownav.studies.benchmark import REPEATS, Figure, best_of
 from flownav.studies.benchmark.campaigns import campaigns
-from flownav.studies.benchmark.figure import REPEATS, Figure, best_of
 
 PART_STEPS, PART_ROUNDS = 1000, 50
 NAVIGATORS_SHARE = 4  # the navigator's batch is so many times smaller

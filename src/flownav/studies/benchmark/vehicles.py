@@ -32,7 +32,7 @@ from flownav.simulation.plan import ATTITUDE_STEPS, PHYSICS_S, PHYSICS_STEPS, Fl
 from flownav.simulation.plant import observe_vehicle, step_vehicle
 from flownav.simulation.scenario import load_scenario, with_vehicle
 from flownav.simulation.truth import packed_truth
-from flownav.studies.benchmark.figure import best_of
+from flownav.studies.benchmark import best_of
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.state import CALM
 

@@ -180,7 +180,12 @@ def derivative_at_roots(
         *airframe.linear_acceleration(velocity, rates, (total.x, total.y, total.z), vehicle.mass_kg),
         *quaternion_rate(state.qw, state.qx, state.qy, state.qz, state.p, state.q, state.r),
         *airframe.angular_acceleration(rates, (total.l, total.m, total.n), vehicle),
-        *spins,
+        spins.one,
+        spins.two,
+        spins.three,
+        spins.four,
+        spins.five,
+        spins.six,
         power / (vehicle.efficiency * voltage),
     )
 

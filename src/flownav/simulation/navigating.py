@@ -168,7 +168,7 @@ def put_on_truth(
 ) -> OnTruth:  # fmt: skip
     """The navigator's position, velocity and attitude become the truth at its horizon, for Jacobians to be taken there.
 
-    Its covariance is then that of the posterior Cramér-Rao bound along this flight (`estimation.bound`), for its model.
+    Its covariance is then that of the posterior Cramér-Rao bound along this flight, for its model.
     """
     running = start.started > 0.0 and reached
     return OnTruth(

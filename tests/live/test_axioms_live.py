@@ -15,7 +15,7 @@ import pytest
 from flownav.core.compile import ONE_LANE
 from flownav.core.frames import euler_from_quaternion, quaternion_from_euler, quaternion_product
 from flownav.core.measurement import Measurement, Sensor
-from flownav.estimation.packed import pack
+from flownav.estimation.consistency import pack
 from flownav.estimation.states import ATTITUDE, GYRO_BIAS, POSITION, QUATERNION, STATES, VELOCITY
 from flownav.live import writing
 from flownav.live.answers import LONGEST_AHEAD_S, estimate_of, quality_of, why_withheld

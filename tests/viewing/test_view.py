@@ -14,8 +14,8 @@ from flownav.cli import app
 from flownav.core.errors import InputError
 from flownav.core.frames import rotation_from_quaternion, to_body, to_earth
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
+from flownav.export.viewing import has_display, write_rrd
 from flownav.export.viewing.shapes import cameras, flow_arrows, vehicle_outline
-from flownav.export.viewing.view import has_display, write_rrd
 from report_records import flight
 
 rr = pytest.importorskip("rerun")

@@ -16,8 +16,8 @@ from flownav.logs.open_log import open_flight
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import settings_of
 from flownav.parts.calling import name_of
+from flownav.parts.flying import replay_with
 from flownav.parts.protocols import Filter
-from flownav.parts.replaying import replay_with
 from flownav.replays.bundle import to_record
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions

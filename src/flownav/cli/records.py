@@ -48,7 +48,7 @@ def view(
     Without --out a window opens; on a machine without a display the file is written beside the record instead.
     """
     from flownav.core.record import Record
-    from flownav.export.viewing.view import SUFFIX, has_display, show, write_rrd
+    from flownav.export.viewing import SUFFIX, has_display, show, write_rrd
 
     beside = out is None and not has_display()
     path = record.with_suffix(SUFFIX) if beside else out

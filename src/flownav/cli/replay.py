@@ -227,7 +227,7 @@ def info(
     from flownav.core.compile import announce_compilation
     from flownav.logs.open_log import open_log
     from flownav.logs.ros.topics import asked_topics
-    from flownav.studies.inspection.summary import summarise
+    from flownav.studies.inspection import summarise
 
     read = open_log(log, flow_instance=flow_instance, topics=asked_topics(topic or []))
     with announce_compilation("inspection"):

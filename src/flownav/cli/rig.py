@@ -13,7 +13,7 @@ from flownav.cli.output import Column, answer, emit, folder_place, progress, say
 from flownav.core.errors import InputError
 
 if TYPE_CHECKING:
-    from flownav.export.samples.writing import Written
+    from flownav.export.samples.kinds import Written
     from flownav.lab.rig.experiment import RigLog, RigSettings
 
 HEIGHTS_M = ["0.6"]
@@ -72,8 +72,7 @@ def _swung(settings: RigSettings, heights_m: list[float], folder: Path) -> list[
     """Every run at every height, written in a folder of its own; what each was."""
     from flownav.core.compile import announce_compilation
     from flownav.core.provenance import command_line
-    from flownav.lab.rig.experiment import run_campaign
-    from flownav.lab.rig.log_folder import check_rig_folder, run_folders, write_rig_folder
+    from flownav.lab.rig.experiment import check_rig_folder, run_campaign, run_folders, write_rig_folder
 
     count = len(heights_m) * settings.runs
     rows, folders = [], list(run_folders(folder, count))
@@ -114,8 +113,7 @@ def sample(
     from importlib.util import find_spec
 
     from flownav.export.samples.kinds import SAMPLES as MADE
-    from flownav.export.samples.kinds import sample_of
-    from flownav.export.samples.writing import write_samples
+    from flownav.export.samples.kinds import sample_of, write_samples
 
     folder = out or Path("samples")
     asked = [sample_of(kind) for kind in (words("KIND", kinds) if kinds else [])]

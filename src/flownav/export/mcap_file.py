@@ -20,8 +20,19 @@ from flownav.core.errors import InputError, arg
 from flownav.core.guard import written_whole
 from flownav.core.record import Column, Record, Table
 from flownav.core.version import __version__
-from flownav.export.tables import Stamps, finite_rows, is_text, manifest_json, shift_needed_s, stamps, texts
-from flownav.export.trajectory import ENU_FROM_NED, Trajectory, error_table, trajectories
+from flownav.export.trajectory import (
+    ENU_FROM_NED,
+    Stamps,
+    Trajectory,
+    error_table,
+    finite_rows,
+    is_text,
+    manifest_json,
+    shift_needed_s,
+    stamps,
+    texts,
+    trajectories,
+)
 
 Schema = dict[str, Any]
 
@@ -45,15 +56,9 @@ POSE_IN_FRAME = _object(
     {"timestamp": TIME, "frame_id": TEXT, "pose": _object({"position": VECTOR, "orientation": QUATERNION})},
     "foxglove.PoseInFrame",
 )
+TRANSFORM = ("timestamp", "parent_frame_id", "child_frame_id", "translation", "rotation")
 FRAME_TRANSFORM = _object(
-    {
-        "timestamp": TIME,
-        "parent_frame_id": TEXT,
-        "child_frame_id": TEXT,
-        "translation": VECTOR,
-        "rotation": QUATERNION,
-    },
-    "foxglove.FrameTransform",
+    dict(zip(TRANSFORM, (TIME, TEXT, TEXT, VECTOR, QUATERNION), strict=True)), "foxglove.FrameTransform"
 )
 _TYPES = {"f": "number", "i": "integer", "u": "integer", "b": "boolean"}
 
@@ -156,14 +161,8 @@ def _earth(time_ns: Stamps) -> Channel:
     return Channel("/tf", FRAME_TRANSFORM, time_ns, iter(rows))
 
 
-def _transform(time: Row, parent: str, child: str, translation: Row, rotation: Row) -> Row:
-    return {
-        "timestamp": time,
-        "parent_frame_id": parent,
-        "child_frame_id": child,
-        "translation": translation,
-        "rotation": rotation,
-    }
+def _transform(*values: Row | str) -> Row:
+    return dict(zip(TRANSFORM, values, strict=True))
 
 
 def _time(time_ns: int) -> Row:

@@ -22,8 +22,7 @@ from flownav.core.errors import InputError, arg
 from flownav.core.guard import written_whole
 from flownav.core.measurement import Array
 from flownav.core.record import POSITION_NED, Record
-from flownav.export.tables import stamps
-from flownav.export.trajectory import Trajectory, trajectories
+from flownav.export.trajectory import Trajectory, stamps, trajectories
 
 AXES = {"ned": "earth NED, body FRD", "enu": "earth ENU, body FLU"}
 EUROC_POSE = (

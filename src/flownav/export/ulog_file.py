@@ -17,8 +17,7 @@ from flownav.core.provenance import hash_of
 from flownav.core.record import Record
 from flownav.core.version import __version__
 from flownav.export import ulog_topics as ulog
-from flownav.export.tables import finite_rows, is_text, shift_needed_s
-from flownav.export.trajectory import trajectories
+from flownav.export.trajectory import finite_rows, is_text, shift_needed_s, trajectories
 
 DEFINITIONS = frozenset(b"BFIMPQ")
 FLAGS_SIZE, INCOMPATIBLE_AT, OFFSETS_AT = 40, 8, 16

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from flownav.core.frames import heading_from_quaternion
 from flownav.core.record import STANDARD_DEVIATIONS as STD
 from flownav.core.record import Record, Table
-from flownav.export.tables import Stamps, finite_rows, is_text, stamps
-from flownav.export.trajectory import Trajectory
+from flownav.export.trajectory import Stamps, Trajectory, finite_rows, is_text, stamps
 
 MAGIC = b"ULog\x01\x12\x35"
 HEADER_SIZE = 16

@@ -40,12 +40,8 @@ class LiftOff(NamedTuple):
 
     def as_json(self) -> dict[str, Any]:
         """Median, 5th and 95th percentile of each."""
-        return {
-            "flights": len(self.shaken_m_s),
-            "shaken_m_s": spread(self.shaken_m_s),
-            "unshaken_m_s": spread(self.unshaken_m_s),
-            "frozen_inflow_share": spread(self.frozen_inflow_share),
-        }
+        spreads = {name: spread(getattr(self, name)) for name in (*self._fields, "frozen_inflow_share")}
+        return {"flights": len(self.shaken_m_s), **spreads}
 
 
 def lift_offs(shaken: Flight, unshaken: Flight, seed: int, flights: int) -> LiftOff | None:
@@ -93,6 +89,11 @@ class Flights:
     record: Record
     white_noise_m: float
     lift_off: LiftOff | None = None
+
+    @property
+    def what(self) -> str:
+        """What is flown, in a word."""
+        return {"takeoff": "take-off"}.get(self.scenario, self.scenario)
 
     def as_json(self) -> dict[str, Any]:
         """The table's rows: published and reproduced, each state, and where the paper lies among our flights."""

@@ -7,7 +7,7 @@ import numpy as np
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, QUATERNION, Table
 from flownav.export.samples.flight import changes, fixes_of, velocities_ned
-from flownav.export.tables import Stamps, stamps
+from flownav.export.trajectory import Stamps, stamps
 from flownav.export.ulog_topics import Field, Topic, assembled
 from flownav.logs.log import Log
 

@@ -16,10 +16,9 @@ import numpy as np
 
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array
-from flownav.lab.identification import height_law
 from flownav.lab.identification.descent import Structure
 from flownav.lab.identification.experiment import Experiment, experiment
-from flownav.lab.identification.findings import Findings, Noise, Response
+from flownav.lab.identification.findings import Findings, Noise, Response, noise_of
 from flownav.lab.identification.first_look import Axes, judged
 from flownav.lab.identification.flight import Flight
 from flownav.lab.identification.output_error import Z_95, fit
@@ -216,17 +215,7 @@ def _noise(flown: Flight, velocity: Array, residuals: Sequence[Array]) -> Noise:
     ranges, quality = flown.range_m[flown.good], flown.quality[flown.good]
     error = np.concatenate([_complete(residual, len(ranges)) for residual in residuals])
     height, grade = np.concatenate([ranges, ranges]), np.concatenate([quality, quality])
-    points = height_law.noise_by_height(error, height)
-    signal = float(velocity[flown.good].std())
-    law = height_law.fit_power_law(points)
-    return Noise(
-        tuple(points),
-        law,
-        tuple(height_law.variance_by_quality(error, grade)),
-        tuple(height_law.compare_schedules(error, height, grade, signal)),
-        signal,
-        height_law.tail(error, law.at(height)),
-    )
+    return noise_of(error, height, grade, float(velocity[flown.good].std()))
 
 
 def _complete(residual: Array, count: int) -> Array:
@@ -288,6 +277,6 @@ def _details(
     for name, tie in (("flow", moved.flow_tie), ("reference", moved.reference_tie)):
         if tie is not None:
             details[f"{name}_against_imu"] = {
-                "delay_s": tie.delay_s.as_dict(), "turn_deg": float(np.degrees(tie.turn_rad)), "likeness": tie.likeness
+                "delay_s": tie.delay_s._asdict(), "turn_deg": float(np.degrees(tie.turn_rad)), "likeness": tie.likeness
             }  # fmt: skip
     return details

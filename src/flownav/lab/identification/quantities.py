@@ -48,10 +48,6 @@ class Interval(NamedTuple):
         spread = float(np.exp(min(Z_95 * sigma, 50.0)))
         return cls(value, value / spread, value * spread)
 
-    def as_dict(self) -> dict[str, float]:
-        """For JSON and files."""
-        return {"value": self.value, "low": self.low, "high": self.high}
-
 
 class Excitation(NamedTuple):
     """How many of a model's parameters the input shows. spreads: relative standard deviation of each direction."""

@@ -37,10 +37,7 @@ def sensor_entries(findings: Findings, base: FlowSensor, name: str, provenance: 
         "dynamics": _dynamics(findings),
         "noise": _noise(findings),
         "limits": _limits(findings, base),
-        "optics": {
-            "focal_length_px": _taken(base.optics.focal_length_px, base),
-            "image_side_px": _taken(base.optics.image_side_px, base),
-        },
+        "optics": {key: _taken(getattr(base.optics, key), base) for key in ("focal_length_px", "image_side_px")},
         "identification": _identification(findings),
         "identified_models": _run_models(findings),
     }
@@ -99,11 +96,8 @@ def _dynamics(findings: Findings) -> dict[str, Any]:
     gain = best.gain if findings.kind == "rig" else findings.gain
     slowness, stiffness = bessel(max(findings.latency_s.value, SHORTEST_LATENCY_S))
     source = "Bessel lag of the identified gain and latency; the natural frequency is assumed"
-    return {
-        "a_1_s2": {"value": abs(gain.value) * stiffness, "source": source},
-        "b_1_s": {"value": slowness, "source": source},
-        "c_1_s2": {"value": stiffness, "source": source},
-    }
+    lag = {"a_1_s2": abs(gain.value) * stiffness, "b_1_s": slowness, "c_1_s2": stiffness}
+    return {key: {"value": value, "source": source} for key, value in lag.items()}
 
 
 def bessel(latency_s: float) -> tuple[float, float]:
@@ -163,9 +157,7 @@ def _identification(findings: Findings) -> dict[str, Any]:
         "notes": list(findings.notes),
         "dynamics": _dynamics_interval(findings.best),
         "responses": [_response(response) for response in findings.responses],
-        "noise": [
-            {"height_m": p.height_m, "sigma_m_s": p.sigma_m_s, "readings": p.readings} for p in findings.noise.points
-        ],
+        "noise": [point._asdict() for point in findings.noise.points],
         "quality": [
             {"quality_low": q.low, "quality_high": q.high, "variance_m2_s2": q.variance_m2_s2, "readings": q.readings}
             for q in findings.noise.quality

@@ -138,13 +138,7 @@ def flow_figures(flown: Replay, smoothed: Smoothed) -> dict[str, float]:
     slant_m = height_m / smoothed.tilt_cosine(stream.t_s)
     ahead = np.column_stack([turned[:, 1], -turned[:, 0]])
     fit = fit_flow(stream.t_s[known], ahead[known], slant_m[known], smoothed)
-    return {
-        "flow_gain": fit.gain,
-        "flow_lag_s": fit.lag_s,
-        "flow_noise_rad_s": fit.noise_rad_s,
-        "flow_noise_lag_one": fit.noise_lag_one,
-        "flow_blind_share": blind,
-    }
+    return {f"flow_{name}": value for name, value in fit._asdict().items()} | {"flow_blind_share": blind}
 
 
 def fit_flow(t_s: Array, ahead_rad_s: Array, slant_m: Array, smoothed: Smoothed) -> FlowFit:

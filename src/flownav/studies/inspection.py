@@ -1,4 +1,4 @@
-"""A log in figures: its streams, its clock, its limits, what its sensors say of each other, what it lacks."""
+"""Inspection: a log in figures: its streams, clock, limits, what its sensors say of each other, what it lacks."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -187,9 +187,5 @@ def _of_range(log: Log) -> list[Finding]:
     if share < LEAST_JUMPING:
         return []
     largest = float(np.abs(np.diff(range_m)).max())
-    return [
-        Finding(
-            f"range jumps in {share:.0%} of its steps in flight, by up to {largest:.1f} m: velocities from flow and "
-            f"range are off by {doubt:.0%} or so"
-        )
-    ]
+    jumping = f"range jumps in {share:.0%} of its steps in flight, by up to {largest:.1f} m"
+    return [Finding(f"{jumping}: velocities from flow and range are off by {doubt:.0%} or so")]

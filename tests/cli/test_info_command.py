@@ -19,7 +19,7 @@ from flownav.core.frames import quaternion_from_euler
 from flownav.core.measurement import Sensor
 from flownav.logs.open_log import open_log
 from flownav.scoring.path import autopilot_errors
-from flownav.studies.inspection.summary import summarise
+from flownav.studies.inspection import summarise
 from replay_logs import log_of_flight
 from ulog_files import ulog_of_flight
 

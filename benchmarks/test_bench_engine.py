@@ -10,7 +10,7 @@ from flownav.core.compile import LANES, ONE_LANE
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import buffers_of, fly_into
 from flownav.simulation.scenario import load_scenario, with_filter
-from flownav.studies.benchmark.filters import PAPER_ROWS, run_paper_filter
+from flownav.studies.benchmark.vehicles import PAPER_ROWS, run_paper_filter
 
 STEPS = 1000
 

@@ -17,7 +17,7 @@ from filterpy.kalman import KalmanFilter
 from flownav.core.compile import LANES, ONE_LANE
 from flownav.estimation.lag import FlowLag
 from flownav.estimation.states import STATES, STATES_WITH_LAG
-from flownav.studies.benchmark.filters import SETTINGS, correct_often, offer_nothing, predict_often
+from flownav.studies.benchmark.vehicles import SETTINGS, correct_often, offer_nothing, predict_often
 from landing_loop import (
     ATTITUDE_VARIANCE,
     SCALARS,

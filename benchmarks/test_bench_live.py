@@ -23,9 +23,9 @@ import pytest
 
 from flownav.core.measurement import Sensor
 from flownav.live.byte_links import open_link
+from flownav.live.filtering import Options
 from flownav.live.link import MOST_READS, Piece, UdpLink, parse_url
 from flownav.live.loop import Latency, run_before_others, run_session, warm_up
-from flownav.live.options import Options
 from flownav.live.recorder import Recorder
 from flownav.live.session import Session
 

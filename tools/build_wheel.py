@@ -34,7 +34,7 @@ def gather(folder: Path) -> list[Path]:
     python(PROJECT / "tools" / "commands_for_wheel.py", folder / "work", FLOWNAV_CACHE=run_at, FLOWNAV_LEVEL=RUN_AT)
     for level in COMPILED_FOR:
         print(f"compiling the same for {level}", flush=True)
-        python("-m", "flownav.core.compiling.shipping", run_at, FLOWNAV_CACHE=folder / level, FLOWNAV_LEVEL=level)
+        python(PROJECT / "tools" / "compile_again.py", run_at, FLOWNAV_CACHE=folder / level, FLOWNAV_LEVEL=level)
     caches = {level: sorted((folder / level / "kernels").glob("*.kernel")) for level in (RUN_AT, *COMPILED_FOR)}
     of_commands = {_function(path) for path in caches[RUN_AT]}
     for level, files in caches.items():

@@ -13,8 +13,7 @@ from flownav.studies.benchmark import vehicles as timed
 from flownav.studies.benchmark.measures import vehicles
 from flownav.studies.benchmark.vehicles import LANES, Parts, fly_untaken, landing_of, parts_of, plant_after
 from flownav.vehicle import multirotor
-from flownav.vehicle.around import CALM
-from flownav.vehicle.state import Controls
+from flownav.vehicle.state import CALM, Controls
 
 
 @pytest.fixture(scope="module")

@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from flownav.campaigns.ablations import (
+from command import printed
+from flownav.campaigns.accuracy import CASES, Target, flights_of, scenario_of
+from flownav.campaigns.judged import (
     ablations,
     ageless,
     constant_flow_noise,
+    fly_judged,
     without_compass_states,
     without_gps_states,
 )
-from flownav.campaigns.accuracy import CASES, Target, flights_of, scenario_of
-from flownav.campaigns.judged import fly_judged
 from flownav.campaigns.local import fly_many, home_epoch, known_exactly
 from flownav.cli import app
 from flownav.core.errors import InputError, VerdictError
@@ -216,7 +217,7 @@ def test_json_has_every_figure_and_the_exit_status_follows_the_targets():
     missed = [target for target in case["targets"] if not target["kept"]]
     assert bool(missed) == isinstance(done.exception, VerdictError)
     for target in missed:
-        assert f"landing: {target['truth_model']}: {target['what']}" in str(done.exception)
+        assert f"landing: {target['truth_model']}: {target['what']}" in printed(done.exception)
 
 
 def test_a_target_is_kept_on_its_side_and_not_by_nan():
@@ -262,11 +263,11 @@ def test_a_multirotor_flies_the_cases_and_is_not_held_against_the_papers_filter(
 def test_a_mistake_is_an_input_error(arguments, message):
     done = run(*arguments)
     assert isinstance(done.exception, InputError)
-    assert message in str(done.exception)
+    assert message in printed(done.exception)
 
 
 def test_an_out_file_that_cannot_be_written_is_said_before_anything_flies(tmp_path):
     (tmp_path / "file").write_text("", encoding="utf-8")
     done = run("--out", tmp_path / "file" / "x.md")
     assert isinstance(done.exception, InputError)
-    assert "cannot be written" in str(done.exception)
+    assert "cannot be written" in printed(done.exception)

@@ -11,11 +11,11 @@ from flownav.campaigns.accuracy import scenario_of
 from flownav.campaigns.judged import bound_of
 from flownav.campaigns.local import fly_recorded
 from flownav.core.measurement import Sensor
-from flownav.estimation.bound import posterior_bound
 from flownav.simulation.assemble import assemble
 from flownav.simulation.fitting import refitted
 from flownav.simulation.onboard import without
 from flownav.simulation.scenario import load_scenario, with_filter
+from posterior_bound import posterior_bound
 
 IMU_S, GPS_EVERY = 0.01, 2
 BESIDE = ("flow_camera", "range_sensor", "barometer")

@@ -23,7 +23,7 @@ from flownav.campaigns.measures import (
     measured,
     stop_of,
 )
-from flownav.campaigns.plan import TOGETHER, Spread, changed, design_of, planned
+from flownav.campaigns.plan import LOT_FLIGHTS, Spread, changed, design_of, planned
 from flownav.campaigns.summary import Flight, worst_first
 from flownav.core.errors import InputError
 from flownav.simulation.dispersion import uniforms
@@ -88,12 +88,12 @@ def test_a_plain_design_is_the_noise_counter():
 
 @pytest.mark.parametrize("kind", ["latin", "sobol"])
 def test_each_lot_of_a_design_has_one_flight_in_each_stratum(kind):
-    design = Spread(kind, ["wind", "mass"], 2 * TOGETHER)
+    design = Spread(kind, ["wind", "mass"], 2 * LOT_FLIGHTS)
     for name in ("wind", "mass"):
         for lot in range(2):
-            flights = range(lot * TOGETHER, (lot + 1) * TOGETHER)
-            strata = np.floor(design.uniforms(1, flights, name) * TOGETHER).astype(int)
-            assert sorted(strata) == list(range(TOGETHER))
+            flights = range(lot * LOT_FLIGHTS, (lot + 1) * LOT_FLIGHTS)
+            strata = np.floor(design.uniforms(1, flights, name) * LOT_FLIGHTS).astype(int)
+            assert sorted(strata) == list(range(LOT_FLIGHTS))
 
 
 @pytest.mark.parametrize("kind", ["latin", "sobol"])
@@ -112,9 +112,9 @@ def test_flights_beyond_a_design_are_plain():
 
 @pytest.mark.parametrize("kind", ["latin", "sobol"])
 def test_a_mean_over_a_design_is_nearer_than_one_over_plain_flights(kind):
-    flights = range(TOGETHER)
+    flights = range(LOT_FLIGHTS)
     plain = [np.mean(uniforms(seed, flights, "mass")) for seed in range(20)]
-    spread = [np.mean(Spread(kind, ["mass"], TOGETHER).uniforms(seed, flights, "mass")) for seed in range(20)]
+    spread = [np.mean(Spread(kind, ["mass"], LOT_FLIGHTS).uniforms(seed, flights, "mass")) for seed in range(20)]
     assert np.std(spread) < 0.1 * np.std(plain)
 
 
@@ -155,7 +155,7 @@ def test_the_interval_at_which_a_campaign_stops_holds_as_often_as_it_says():
 def test_stops_in_words():
     assert stop_of("r95_m width <= 0.005") == ("r95_m", 0.005)
     for text in ("r95_m", "r95_m width <= 0", "r95_m width <= x", "r95_m width <= nan", "r9_m width <= 1", ""):
-        with pytest.raises(InputError, match="--until"):
+        with pytest.raises(InputError, match="until"):
             stop_of(text)
     assert all(figure.words for figure in FIGURES.values())
 

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from command import printed
 from command import run as typed
 from flownav.campaigns.engines import Local, Part, neighbours
 from flownav.campaigns.local import fly_many
@@ -307,6 +308,6 @@ def test_mistakes_are_told_in_one_line(tmp_path, monkeypatch, arguments, words):
     monkeypatch.chdir(tmp_path)
     found = run(*arguments)
     assert isinstance(found.exception, InputError)
-    assert words in str(found.exception)
+    assert words in printed(found.exception)
     assert "\n" not in str(found.exception)
     assert not list(tmp_path.iterdir())

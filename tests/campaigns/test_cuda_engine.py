@@ -90,7 +90,7 @@ def test_no_more_flights_at_once_than_memory_holds(cells):
 
 def test_other_processes_draw_the_same_truths(cells, monkeypatch):
     monkeypatch.setattr(cuda, "WORTH_IT", 1)
-    monkeypatch.setattr(cuda, "SLICE", 16)
+    monkeypatch.setattr(cuda, "SLICE_FLIGHTS", 16)
     cell = cells["ensemble"]
     alone = truths_of(cell.flight, 7, cell.ensemble)(30, 50)
     with truths_of_cell(cell, 7, 50, 2) as truths:

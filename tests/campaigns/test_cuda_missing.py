@@ -37,5 +37,5 @@ def test_a_missing_library_is_named_with_its_extra(monkeypatch):
 
     monkeypatch.delenv("NUMBA_ENABLE_CUDASIM", raising=False)
     monkeypatch.setitem(sys.modules, "numba_cuda", None)
-    with pytest.raises(InputError, match=r"^--engine cuda: numba-cuda is not installed .*flownav.gpu.*--engine local"):
+    with pytest.raises(InputError, match=r"^engine cuda: numba-cuda is not installed .*flownav.gpu.*engine local"):
         Cuda()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from command import printed
 from flownav.campaigns.local import directions_deg, fly_envelope, fly_many, in_wind
 from flownav.cli import app
 from flownav.core.errors import InputError
@@ -103,4 +104,4 @@ def test_the_command_flies_the_vehicle_that_it_is_told(tmp_path):
 def test_a_mistake_is_an_input_error(arguments, message):
     done = run(*arguments)
     assert isinstance(done.exception, InputError)
-    assert message in str(done.exception)
+    assert message in printed(done.exception)

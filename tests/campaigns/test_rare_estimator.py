@@ -8,7 +8,7 @@ import pytest
 from flownav.campaigns.rare import estimate
 from flownav.campaigns.rare.estimate import find, together_with
 from flownav.campaigns.rare.likely import moments, nats, rank_inputs
-from flownav.campaigns.rare.walk import FIRST_STREAM, WALK, ancestors, climb, fly_islands, next_level
+from flownav.campaigns.rare.walk import FIRST_STREAM, WALK_STATES, ancestors, climb, fly_islands, next_level
 from rare_stand_in import INPUTS, SPANS, limit_of, walker_of
 
 REPEATS = 120
@@ -148,7 +148,7 @@ def test_walks_leave_all_flights_as_probable_as_they_are():
 
 def test_ancestors_are_chosen_evenly():
     rng = np.random.default_rng(1)
-    chosen = ancestors(rng, np.array([5, 6, 7]), WALK)
+    chosen = ancestors(rng, np.array([5, 6, 7]), WALK_STATES)
     assert sorted(np.bincount(chosen, minlength=8)[5:].tolist()) == [2, 3, 3]
     assert len(set(ancestors(rng, np.arange(40), 16).tolist())) == 16
 

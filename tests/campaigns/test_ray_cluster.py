@@ -74,7 +74,7 @@ def test_the_rows_are_those_of_one_machine_in_order_though_workers_are_lost(cell
     found = list(engines.RayCluster().fly(cell, 5, PARTS[:6], counted.append))
     assert [part for part, _ in found] == PARTS[:6]
     assert counted == [FLIGHTS] * 6
-    assert ray.most_waiting == 2 * engines.AHEAD
+    assert ray.most_waiting == 2 * engines.PARTS_AHEAD
     for (_, rows), (_, expected) in zip(found, Local().fly(cell, 5, PARTS[:6]), strict=True):
         assert rows.tobytes() == expected.tobytes()
 

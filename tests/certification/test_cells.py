@@ -161,7 +161,7 @@ def test_what_cannot_be_flown_is_one_line(tmp_path, text, said):
 
 def test_vehicles_are_named_in_one_place_and_cells_are_not_endless(tmp_path):
     text = FLOWN + '[conditions]\nvehicle = ["quad-450"]\n' + ASKED
-    with pytest.raises(InputError, match="--vehicle hexa-550: small names vehicles in its conditions"):
+    with pytest.raises(InputError, match="vehicle hexa-550: small names vehicles in its conditions"):
         planned(tmp_path, text, vehicle="hexa-550")
     many = ", ".join(f'"{k}.toml"' for k in range(MOST_CELLS + 1))
     with pytest.raises(InputError, match=rf"conditions: {MOST_CELLS + 1} cells; at most {MOST_CELLS} are flown"):

@@ -7,6 +7,7 @@ import json
 import pytest
 from typer.testing import CliRunner
 
+from command import printed
 from flownav.cli import app
 from flownav.core.errors import InputError, VerdictError
 from requirements import ASKED, HEAD, WINDY, write
@@ -89,7 +90,7 @@ def test_a_pass_is_exit_status_0_and_everything_else_1(tmp_path):
 def test_mistakes_are_one_line(arguments, said):
     failed = run(*arguments)
     assert isinstance(failed.exception, InputError)
-    assert said in str(failed.exception)
+    assert said in printed(failed.exception)
     assert "\n" not in str(failed.exception)
 
 
@@ -97,5 +98,5 @@ def test_a_folder_of_something_else_is_not_written_to(tmp_path):
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "flight.txt").write_text("mine", encoding="utf-8")
     failed = run(write(tmp_path, HEAD + CALM + CRASH), "--out", tmp_path / "full")
-    assert "full: is there and holds no campaign; give another --out" in str(failed.exception)
+    assert "full: is there and holds no campaign; give another name" in printed(failed.exception)
     assert [path.name for path in (tmp_path / "full").iterdir()] == ["flight.txt"]

@@ -12,6 +12,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from command import printed
 from flownav.cli.compare import command
 from flownav.core.errors import InputError
 from flownav.studies.compare.job import HEADINGS, cells, default_windows, logs_in, markdown, names_of, page, play
@@ -180,7 +181,7 @@ def test_a_mistake_is_one_line_and_leaves_no_file(garden, hall, tmp_path, argume
     places = {"GARDEN": garden, "HALL": hall}
     result = call(*(places.get(argument, argument) for argument in arguments))
     assert isinstance(result.exception, InputError), result.exception
-    assert said in str(result.exception)
+    assert said in printed(result.exception)
     assert "\n" not in str(result.exception)
     assert result.stdout == ""
     assert [path.name for path in Path.cwd().iterdir()] == ["taken"]

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from flownav.core.compiling import closure, shipping
+import compile_again
+from flownav.core.compiling import closure
 from places import PROJECT
 
 PARTS = """
@@ -30,6 +31,7 @@ def total(a):
     return a[0] + a[1]
 """
 USE = "import numpy as np; import parts; parts.ONE(np.ones(1)); parts.MANY(np.ones(16)); print(parts.total(np.ones(2)))"
+AGAIN = str(PROJECT / "tools" / "compile_again.py")
 
 
 def in_python(place: Path, cache: str, level: str, *command: str) -> str:
@@ -46,14 +48,14 @@ def in_python(place: Path, cache: str, level: str, *command: str) -> str:
 def test_kernels_are_compiled_for_a_level_without_being_run(tmp_path):
     (tmp_path / "parts.py").write_text(PARTS)
     assert in_python(tmp_path, "v3", "x86-64-v3", "-c", USE) == "2.0"
-    assert in_python(tmp_path, "v4", "x86-64-v4", "-m", "flownav.core.compiling.shipping", str(tmp_path / "v3")) == "3"
+    assert in_python(tmp_path, "v4", "x86-64-v4", AGAIN, str(tmp_path / "v3")) == "3"
     of_v3, of_v4 = ({path.name for path in (tmp_path / level / "kernels").iterdir()} for level in ("v3", "v4"))
     assert len(of_v4) == 3
     assert not of_v3 & of_v4
     for name in of_v4:
         shutil.copy(tmp_path / "v4" / "kernels" / name, tmp_path / "v3" / "kernels")
     # what was compiled for the other level is what that level would have compiled
-    again = in_python(tmp_path, "v3", "x86-64-v4", "-m", "flownav.core.compiling.shipping", str(tmp_path / "v4"))
+    again = in_python(tmp_path, "v3", "x86-64-v4", AGAIN, str(tmp_path / "v4"))
     assert again == "3"
     assert {path.name for path in (tmp_path / "v3" / "kernels").iterdir()} == of_v3 | of_v4
 
@@ -61,9 +63,9 @@ def test_kernels_are_compiled_for_a_level_without_being_run(tmp_path):
 def test_a_kernel_and_units_of_a_function_are_found():
     from flownav.navigation.take import navigate_lanes, navigate_one
 
-    found = list(shipping.parts_of("flownav.navigation.take", "take_one"))
+    found = list(compile_again.parts_of("flownav.navigation.take", "take_one"))
     assert found[:2] == [navigate_one, navigate_lanes]
-    assert list(shipping.parts_of("flownav.navigation.take", "navigate")) == []
+    assert list(compile_again.parts_of("flownav.navigation.take", "navigate")) == []
 
 
 def test_an_installed_library_is_one_wherever_it_lies():

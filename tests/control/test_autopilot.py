@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from flownav.control import autopilot, go_around
 from flownav.control.autopilot import Estimate, grounded, hovering, inner_loop, integrate, outer_loop
 from flownav.control.gains import AutopilotGains
-from flownav.control.go_around import Knowledge
-from flownav.control.guidance import Reference, path_through, reference_at, rounded
+from flownav.control.go_around import Knowledge, Reference, path_through, reference_at, rounded
 from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler, rotation_from_quaternion
 
 GAINS = AutopilotGains()

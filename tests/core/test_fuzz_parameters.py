@@ -19,10 +19,9 @@ from flownav.navigation.settings_of import settings_of
 from flownav.sensors.barometer import BarometerSheet
 from flownav.sensors.camera_sheets import FlowCameraSheet, PadCameraSheet
 from flownav.sensors.datasheet import load_sensor
-from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
-from flownav.sensors.inertial_sheet import InertialSheet
 from flownav.sensors.magnetometer import MagnetometerSheet
 from flownav.sensors.range_sensor import RangeSensorSheet
+from flownav.sensors.sheets import GpsReceiverSheet, InertialSheet
 from flownav.sensors.skid_switch import SkidSwitchSheet
 from flownav.simulation.dispersion import DispersionFile
 from flownav.simulation.scenario import load_scenario

@@ -16,7 +16,7 @@ from flownav.core.guard import a_run, an_input, an_output, folder_written_whole,
 from flownav.core.parameter_files import read_toml
 from flownav.core.record import Record
 from flownav.lab.optics.frame_files import read_grey
-from flownav.lab.rig.log_folder import check_rig_folder
+from flownav.lab.rig.experiment import check_rig_folder
 from flownav.logs.mavlink.signing import load_key
 from flownav.logs.open_log import open_log
 from replay_logs import log_of_flight

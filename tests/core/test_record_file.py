@@ -19,7 +19,7 @@ import pytest
 
 from flownav.core.errors import InputError
 from flownav.core.record import Record
-from flownav.core.record_file import ALWAYS_BYTES, GROWTH, MOST_BYTES, MOST_MANIFEST, _allowed
+from flownav.core.record_file import ALWAYS_BYTES, MOST_BYTES, MOST_GROWTH, MOST_MANIFEST, _allowed
 from flownav.logs.open_log import open_flight
 
 MOST_MB = 300  # the library and pyarrow take 140; 500 are asked for
@@ -293,7 +293,7 @@ def test_two_hours_at_a_kilohertz_are_within_the_limits():
     assert memory < _allowed(
         memory // 8
     )  # a file eight times smaller than its tables; those of flights are 2 to 3 times
-    assert ALWAYS_BYTES < GROWTH * (4 << 20)
+    assert ALWAYS_BYTES < MOST_GROWTH * (4 << 20)
 
 
 def test_what_was_saved_is_loaded_to_the_bit(tmp_path):

@@ -16,8 +16,8 @@ from flownav.core.frames import (
 )
 from flownav.estimation.hypotheses import larger_axis, size_of
 from flownav.estimation.lag import Lagged, LagMove, lag_of_step, lag_over, moved_lag, seen_velocity
+from flownav.estimation.laws import LEAST_RANGE_M, along_axis, cross, lens_range, turning
 from flownav.estimation.laws.flow import body_velocity, flow_rate
-from flownav.estimation.laws.geometry import LEAST_RANGE_M, along_axis, cross, lens_range, turning
 from flownav.estimation.motion import errors_in_motion, turned
 from flownav.estimation.named import (
     AccelBias,

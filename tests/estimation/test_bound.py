@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flownav.estimation.bound import posterior_bound
+from posterior_bound import posterior_bound
 
 
 def riccati(transitions, process_noises, observations, measurement_noises, covariance):

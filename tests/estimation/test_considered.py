@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from filters import Filter, N, filter_at, random_covariance
 from flownav.core.compile import LANES, ONE_LANE
+from flownav.estimation.consistency import pack, unpack
 from flownav.estimation.covariance import consider, consider_none, correct, fuse
-from flownav.estimation.packed import pack, unpack
 from flownav.estimation.states import (
     ACCEPTED,
     ATTITUDE,

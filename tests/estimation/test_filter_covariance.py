@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from filters import Filter, N, cross_matrix, filter_at, random_covariance
 from flownav.core.compile import LANES, ONE_LANE
-from flownav.estimation.attitude_error import fold_attitude
+from flownav.estimation.consistency import pack, unpack
 from flownav.estimation.covariance import (
     add_noise,
     add_noise_lane,
@@ -28,7 +28,6 @@ from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.gating import Reason
 from flownav.estimation.lag import FlowLag
 from flownav.estimation.laws.pad import pad_fix
-from flownav.estimation.packed import pack, unpack
 from flownav.estimation.states import (
     ACCEPTED,
     ATTITUDE,
@@ -48,6 +47,7 @@ from flownav.estimation.states import (
     STATES_WITH_LAG,
     TEST_RATIO,
     VECTORS,
+    fold_attitude,
 )
 from places import DOCS
 

@@ -9,6 +9,7 @@ import landing_loop
 from filters import KEPT, SETTINGS, Filter, N, filter_at, paper_lag, random_covariance
 from flownav.core.compile import LANES, ONE_LANE, kernel, pointer
 from flownav.core.frames import GRAVITY_M_S2
+from flownav.estimation.consistency import unpack
 from flownav.estimation.covariance import (
     add_noise_lane,
     at,
@@ -28,7 +29,6 @@ from flownav.estimation.laws.height import baro_altitude, range_along_boresight
 from flownav.estimation.laws.pad import pad_fix
 from flownav.estimation.laws.still import gyro_at_rest, pad_below, position_itself, velocity_itself
 from flownav.estimation.motion import hold_still, predict
-from flownav.estimation.packed import unpack
 from flownav.estimation.states import (
     ACCEPTED,
     FLOW_LAG,

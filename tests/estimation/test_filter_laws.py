@@ -17,9 +17,9 @@ from flownav.core.compile import ONE_LANE
 from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler, rotation_from_quaternion
 from flownav.estimation import laws
 from flownav.estimation.law import Observation, Parameter, Signature
+from flownav.estimation.laws import LEAST_RANGE_M, lens_range
 from flownav.estimation.laws.attitude import attitude, bridged_attitude, heading, level
 from flownav.estimation.laws.flow import body_velocity, flow_rate, lagged_flow, lagged_flow_rate
-from flownav.estimation.laws.geometry import LEAST_RANGE_M, lens_range
 from flownav.estimation.laws.gps import gps_position, gps_velocity
 from flownav.estimation.laws.height import baro_altitude, range_along_boresight
 from flownav.estimation.laws.pad import pad_fix, sight

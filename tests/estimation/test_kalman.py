@@ -8,12 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flownav.core.compile import ONE_LANE
-from flownav.estimation import kalman, paper_filter
+from flownav.estimation import paper_filter
 from flownav.estimation.paper_filter import PaperModel
 
 N = 3
-ROWS = kalman.kalman_rows(0, N)
-COUNT = kalman.kalman_row_count(N)
+ROWS = paper_filter.kalman_rows(0, N)
+COUNT = paper_filter.kalman_row_count(N)
 
 
 def filter_of(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -30,9 +30,9 @@ def filter_of(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def offered(work: np.ndarray, component: int, innovation: float, noise: float, gate_sigma: float) -> bool:
     """Offer a reading of one state; whether it was fused."""
     work[[ROWS.innovation, ROWS.noise, ROWS.offered]] = innovation, noise, 1.0
-    kalman.test_component(work, ONE_LANE, ROWS, N, component, gate_sigma)
-    kalman.correct_state(work, ONE_LANE, ROWS, N)
-    kalman.correct_covariance_short(work, ONE_LANE, ROWS, N)
+    paper_filter.test_component(work, ONE_LANE, ROWS, N, component, gate_sigma)
+    paper_filter.correct_state(work, ONE_LANE, ROWS, N)
+    paper_filter.correct_covariance_short(work, ONE_LANE, ROWS, N)
     return bool(work[ROWS.accepted])
 
 
@@ -66,14 +66,14 @@ def test_a_fused_reading_adds_its_information(seed, component, innovation, noise
 
 def test_the_papers_filter_shows_every_components_innovation_and_its_variance():
     size = paper_filter.STATES
-    rows, inputs = kalman.kalman_rows(0, size), kalman.kalman_row_count(size)
+    rows, inputs = paper_filter.kalman_rows(0, size), paper_filter.kalman_row_count(size)
     measured, arrived, seen = inputs + 4, inputs + 4 + size, inputs + 4 + 2 * size
     random = np.random.default_rng(5)
     model = PaperModel(np.eye(size), np.zeros((size, 4)), np.full(size, 0.1), np.array([0.5, 0.4, 0.3, 0.2, 0.1, 0.6]))
     work = np.zeros(seen + 2 * size)
     state, readings = random.standard_normal(size), random.standard_normal(size)
     variances = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
-    kalman.start(work, ONE_LANE, rows, size, variances)
+    paper_filter.start(work, ONE_LANE, rows, size, variances)
     work[rows.state : rows.state + size], work[measured:arrived], work[arrived:seen] = state, readings, 1.0
     paper_filter.update(work, ONE_LANE, rows, measured, arrived, seen, model)  # uncorrelated: none moves another
     assert work[seen : seen + size] == pytest.approx(readings - state)

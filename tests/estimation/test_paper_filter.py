@@ -7,19 +7,19 @@ import pytest
 from filterpy.kalman import KalmanFilter
 
 from flownav.core.compile import LANES, ONE_LANE, kernel
-from flownav.estimation import kalman, paper_filter
+from flownav.estimation import paper_filter
 from flownav.estimation.paper_filter import PaperModel
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario
 
-ROWS = kalman.kalman_rows(0, 6)
-INPUT = kalman.kalman_row_count(6)
+ROWS = paper_filter.kalman_rows(0, 6)
+INPUT = paper_filter.kalman_row_count(6)
 MEASURED, ARRIVED, SEEN, END = INPUT + 4, INPUT + 10, INPUT + 16, INPUT + 28
 
 
 @kernel
 def begin(work, lanes, variance):
-    kalman.start(work, lanes, ROWS, 6, variance)
+    paper_filter.start(work, lanes, ROWS, 6, variance)
 
 
 @kernel

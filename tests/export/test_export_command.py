@@ -8,6 +8,7 @@ import os
 import pytest
 from typer.testing import CliRunner
 
+from command import printed
 from export_records import awkward
 from flownav.cli import app
 from flownav.core.errors import InputError
@@ -44,7 +45,7 @@ def refused(*arguments):
     assert isinstance(done.exception, InputError), done.output
     assert done.stdout == ""
     assert "\n" not in str(done.exception)
-    return str(done.exception)
+    return printed(done.exception)
 
 
 @pytest.mark.parametrize("to", FORMATS)

@@ -11,6 +11,7 @@ import pymap3d
 import pytest
 from typer.testing import CliRunner
 
+from command import printed
 from export_records import awkward
 from flownav.cli import app
 from flownav.core.errors import InputError
@@ -81,7 +82,7 @@ def test_a_record_that_knows_no_origin_asks_for_one(tmp_path, to):
     run = CliRunner()
     error = run.invoke(app, ["export", str(tmp_path / "run.fnr"), "--to", to]).exception
     assert isinstance(error, InputError)
-    assert "give --origin LAT,LON,ALT" in str(error)
+    assert "give --origin LAT,LON,ALT" in printed(error)
     assert [path.name for path in tmp_path.iterdir()] == ["run.fnr"]
     options = ["--to", to, "--origin", ",".join(map(str, ORIGIN))]
     for _ in range(2):  # its own file is replaced
@@ -100,7 +101,7 @@ def test_an_origin_that_cannot_be_is_refused(text, why):
 
 
 def test_an_origin_is_for_what_lies_on_the_earth(tmp_path):
-    with pytest.raises(InputError, match="--origin is for kml and gpx"):
+    with pytest.raises(InputError, match="origin is for kml and gpx"):
         export(awkward(), "csv", tmp_path / "a", origin=ORIGIN)
 
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flownav.core.record import Record
-from flownav.export.tables import finite_rows, shift_needed_s, stamps
+from flownav.export.trajectory import finite_rows, shift_needed_s, stamps
 
 
 @given(st.floats(0.0, 1e5), st.sampled_from([1e3, 1e6, 1e9]))

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from export_records import awkward
 from flownav.core.files import folder_written_whole
 from flownav.core.record import Record
-from flownav.export import tables
+from flownav.export import trajectory
 from flownav.export.formats import export
 
 
@@ -98,7 +98,7 @@ def test_a_folder_that_holds_something_stays_as_it_is(tmp_path, to):
 
 
 def test_a_folder_appears_whole_or_not_at_all(tmp_path, monkeypatch):
-    monkeypatch.setattr(tables, "is_text", lambda column: 1 / 0)
+    monkeypatch.setattr(trajectory, "is_text", lambda column: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         export(awkward(), "parquet", tmp_path / "deep" / "f")
     assert list((tmp_path / "deep").iterdir()) == []

@@ -283,7 +283,7 @@ def test_the_page_names_every_fault_and_no_other():
 
 
 def test_an_unknown_fault_is_refused_with_the_names_there_are():
-    with pytest.raises(InputError, match=r"--faults gremlin: no such fault; there are gps_loss, .*silence"):
+    with pytest.raises(InputError, match=r"faults gremlin: no such fault; there are gps_loss, .*silence"):
         faults_named(["gps_loss", "gremlin"])
 
 

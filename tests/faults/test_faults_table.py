@@ -10,6 +10,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from command import printed
 from flownav.campaigns.faults.catalogue import FAULTS, faults_named
 from flownav.campaigns.faults.navigator import Event, Flag, Navigated, Offers
 from flownav.campaigns.faults.table import fault_table, flight_at, runs, window_start
@@ -172,4 +173,4 @@ def test_the_table_names_fault_and_height(command):
 def test_a_wrong_option_is_refused(command, options, message):
     done = command(*options)
     assert isinstance(done.exception, InputError)
-    assert message in str(done.exception)
+    assert message in printed(done.exception)

@@ -8,9 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flownav.campaigns.faults import integrity
+import integrity
 from flownav.campaigns.faults.catalogue import FAULTS, faults_named
-from flownav.campaigns.faults.integrity import (
+from flownav.campaigns.faults.navigator import Flag, Navigated, Offers, navigator_of
+from flownav.campaigns.faults.table import BASE, DURATIONS_S, HEIGHTS_M, flight_at, runs
+from flownav.core.errors import InputError
+from flownav.estimation.hypotheses import COUNT
+from flownav.estimation.states import HYPOTHESES
+from flownav.simulation.assemble import assemble
+from flownav.simulation.scenario import load_scenario
+from integrity import (
     BEGIN,
     END,
     SUSPECTS,
@@ -26,13 +33,6 @@ from flownav.campaigns.faults.integrity import (
     section,
     table,
 )
-from flownav.campaigns.faults.navigator import Flag, Navigated, Offers, navigator_of
-from flownav.campaigns.faults.table import BASE, DURATIONS_S, HEIGHTS_M, flight_at, runs
-from flownav.core.errors import InputError
-from flownav.estimation.hypotheses import COUNT
-from flownav.estimation.states import HYPOTHESES
-from flownav.simulation.assemble import assemble
-from flownav.simulation.scenario import load_scenario
 
 PROJECT = Path(__file__).parents[2]
 T_S = np.arange(0.0, 10.0, 0.5)

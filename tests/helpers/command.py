@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import NamedTuple
 from unittest.mock import patch
 
-from flownav.cli import main
+from flownav.cli import main, option_of
+from flownav.core.errors import BEGIN, END, FlownavError
 
 
 class Done(NamedTuple):
@@ -19,6 +20,11 @@ class Done(NamedTuple):
     returncode: int
     stdout: str
     stderr: str
+
+
+def printed(error: BaseException | None) -> str:
+    """An error of flownav's as the command line prints it."""
+    return error.naming(option_of) if isinstance(error, FlownavError) else str(error)
 
 
 def run(*arguments: object, cwd: Path = Path("."), columns: str = "80") -> Done:
@@ -32,4 +38,6 @@ def run(*arguments: object, cwd: Path = Path("."), columns: str = "80") -> Done:
         except SystemExit as left:
             status = left.code
     assert isinstance(status, int)
-    return Done(status, out.getvalue(), told.getvalue())
+    done = Done(status, out.getvalue(), told.getvalue())
+    assert not {BEGIN, END} & {*done.stdout, *done.stderr}
+    return done

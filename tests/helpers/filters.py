@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from flownav.core.compile import ONE_LANE
 from flownav.core.frames import quaternion_from_euler
+from flownav.estimation.consistency import pack, unpack
 from flownav.estimation.covariance import fuse
 from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.lag import FlowLag
-from flownav.estimation.packed import pack, unpack
 from flownav.estimation.states import (
     ACCEL_BIAS,
     ACCEL_NOISE,

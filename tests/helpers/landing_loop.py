@@ -15,7 +15,7 @@ from flownav.estimation.laws.gps import gps_position, gps_velocity
 from flownav.estimation.laws.height import range_along_boresight
 from flownav.estimation.motion import errors_in_motion, predict
 from flownav.estimation.states import FILTER_ROWS, MEASURED, NOISE, OFFERED, STATES, STATES_WITH_LAG
-from flownav.studies.benchmark.filters import standing
+from flownav.studies.benchmark.vehicles import standing
 
 ATTITUDE_READ = FILTER_ROWS  # quaternion
 POSITION_READ = ATTITUDE_READ + 4

@@ -102,7 +102,7 @@ def test_irregular_times_are_taken_as_they_are(tmp_path):
 
 def test_a_csv_alone_is_a_run_and_takes_its_height_from_the_option(tmp_path):
     folder = swing(tmp_path, sheet=False)
-    with pytest.raises(InputError, match=r"rig.csv: its height is unknown: give --heights, height_m in rig.toml"):
+    with pytest.raises(InputError, match=r"rig.csv: its height is unknown: give heights_m, height_m in rig.toml"):
         identify([folder / "rig.csv"])
     assert identify([folder / "rig.csv"], [Structure(0)], [0.8]).heights_m == (0.8, 0.8)
 
@@ -144,8 +144,8 @@ def test_a_rig_log_that_lacks_something_says_what(tmp_path, columns, height_m, m
 @pytest.mark.parametrize(
     ("heights", "message"),
     [
-        ([0.6, 0.8], "--heights: 2 heights for 1 logs"),
-        ([-1.0], "--heights: metres from 0.01"),
+        ([0.6, 0.8], "heights_m: 2 heights for 1 logs"),
+        ([-1.0], "heights_m: metres from 0.01"),
     ],
 )
 def test_heights_that_cannot_be_are_refused(tmp_path, heights, message):
@@ -157,7 +157,7 @@ def test_a_reference_that_a_rig_has_not_is_refused(tmp_path):
     folder = swing(tmp_path, duration_s=5.0)
     with pytest.raises(InputError, match="a column encoder_counts or encoder_angle_rad is needed"):
         identify([folder], reference="encoder")
-    with pytest.raises(InputError, match="--reference gps: auto, velocity or encoder are possible for a rig log"):
+    with pytest.raises(InputError, match="reference gps: auto, velocity or encoder are possible for a rig log"):
         identify([folder], reference="gps")
 
 
@@ -207,7 +207,7 @@ def test_an_inverted_sensor_gets_a_positive_model_and_a_verdict(tmp_path):
 
 def test_nothing_is_left_where_the_file_cannot_be_written(found, tmp_path):
     (tmp_path / "taken").write_text("a file, not a folder")
-    with pytest.raises(InputError, match=r"taken/sensor.toml: cannot be written .*; give another --out"):
+    with pytest.raises(InputError, match=r"taken/sensor.toml: cannot be written .*; give another name"):
         written(found, tmp_path / "taken" / "sensor.toml")
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
 
@@ -308,7 +308,7 @@ def test_each_value_has_the_figure_that_it_came_from_above_it(found, tmp_path, a
 
 
 def test_another_autopilot_is_refused(found):
-    with pytest.raises(InputError, match="--for betaflight: px4 or ardupilot are possible"):
+    with pytest.raises(InputError, match="autopilot betaflight: px4 or ardupilot are possible"):
         parameters("betaflight", found, load_sensor())
 
 

@@ -202,7 +202,7 @@ def test_a_flight_that_lacks_something_says_what(tmp_path, without, message):
     ("reference", "message"),
     [
         ("truth", "no reference to identify against; truth.csv is needed"),
-        ("encoder", "--reference encoder: auto, truth (truth.csv) or gps (gps.csv) are possible for a flight"),
+        ("encoder", "reference encoder: auto, truth (truth.csv) or gps (gps.csv) are possible for a flight"),
     ],
 )
 def test_a_reference_that_is_not_there_is_refused(tmp_path, reference, message):
@@ -248,7 +248,7 @@ def test_two_flights_at_once_and_heights_for_a_flight_are_refused(tmp_path):
     folder = written(tmp_path, duration_s=30.0)
     with pytest.raises(InputError, match="a flight is identified alone"):
         identify([folder, folder])
-    with pytest.raises(InputError, match="--heights: a flight's heights come from its range readings"):
+    with pytest.raises(InputError, match="heights_m: a flight's heights come from its range readings"):
         identify([folder], heights_m=[1.0])
 
 

@@ -157,7 +157,7 @@ def test_orders_are_read_and_wrong_ones_refused():
     assert parse_order("2+delay") == (Structure(2, True),)
     assert parse_order("delay") == (DELAY,)
     for wrong in ("0", "7", "two", "2+lag", ""):
-        with pytest.raises(InputError, match="--order"):
+        with pytest.raises(InputError, match="order"):
             parse_order(wrong)
 
 

@@ -15,12 +15,12 @@ import pytest
 from flownav.core.compile import ONE_LANE
 from flownav.core.frames import euler_from_quaternion, quaternion_from_euler, quaternion_product
 from flownav.core.measurement import Measurement, Sensor
-from flownav.estimation.packed import pack
+from flownav.estimation.consistency import pack
 from flownav.estimation.states import ATTITUDE, GYRO_BIAS, POSITION, QUATERNION, STATES, VELOCITY
 from flownav.live import writing
 from flownav.live.answers import LONGEST_AHEAD_S, estimate_of, quality_of, why_withheld
 from flownav.live.hearing import Origin
-from flownav.live.horizon import WINDOW_S, WINDOWS, Horizon, Lags
+from flownav.live.horizon import PATIENT_WINDOWS, WINDOW_S, Horizon, Lags
 from flownav.live.options import Limits
 from flownav.live.reception import COARSE_S, FRESH_S, VehicleClock
 from flownav.live.reception import WINDOW_S as LEADS_S
@@ -50,7 +50,7 @@ def test_a_lag_is_remembered_for_three_to_four_windows_and_then_forgotten(start_
             if 0.1 * k > late_at_s + 0.05 and lags.by_sensor[Sensor.RANGE] < 0.4 and forgotten_s is None:
                 forgotten_s = 0.1 * k - late_at_s
         assert forgotten_s is not None
-        assert (WINDOWS - 1) * WINDOW_S - 0.15 <= forgotten_s <= WINDOWS * WINDOW_S + 0.15
+        assert (PATIENT_WINDOWS - 1) * WINDOW_S - 0.15 <= forgotten_s <= PATIENT_WINDOWS * WINDOW_S + 0.15
 
 
 @ANY_START_S
@@ -63,7 +63,7 @@ def test_one_that_falls_silent_is_waited_for_as_long_and_no_longer(start_s):
         elif Sensor.RANGE in lags.by_sensor:
             waited_s = 0.1 * k - 3.0
             assert lags.horizon_s(0.1, 0.05, 1.0) == pytest.approx(0.45)
-    assert (WINDOWS - 1) * WINDOW_S - 0.15 <= waited_s <= WINDOWS * WINDOW_S + 0.15
+    assert (PATIENT_WINDOWS - 1) * WINDOW_S - 0.15 <= waited_s <= PATIENT_WINDOWS * WINDOW_S + 0.15
     assert lags.horizon_s(0.1, 0.05, 1.0) == pytest.approx(0.1)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import pymap3d
 import pytest
 
+from command import printed
 from command import run as typed
 from flownav.campaigns.faults.table import log_of
 from flownav.campaigns.local import fly_recorded
@@ -182,7 +183,7 @@ def test_a_replay_of_the_record_is_the_same_bits(flight):
     record = assert_same_bits(flight[3])
     assert {"fed", "truth", "imu", "flow_rate", "gps_position", "range"} <= set(record.tables)
     assert record.manifest["kind"] == "live"
-    assert replayed(flight[3]).truth_scores()["velocity_rms_m_s"] < 0.3
+    assert replayed(flight[3]).scores()["truth"]["velocity_rms_m_s"] < 0.3
 
 
 def test_the_screen_shows_rates_ages_and_the_estimate(flight):
@@ -214,7 +215,7 @@ def test_a_restart_in_the_record_is_replayed_too(tmp_path):
 
 def test_options_that_would_change_what_was_fed_are_refused(flight):
     log = open_flight(flight[3])
-    with pytest.raises(InputError, match="without --flow-scale"):
+    with pytest.raises(InputError, match="without flow_scale"):
         as_fed(log, ReplayOptions(flow_scale=(2.0, 1.0)), None)
     with pytest.raises(InputError, match="of one flow sensor"):
         open_flight(flight[3], flow_instance=1)
@@ -283,7 +284,7 @@ def test_mistakes_are_one_line(options, said):
 
     result = CliRunner().invoke(app, ["live", *options])
     assert isinstance(result.exception, InputError)
-    assert said in str(result.exception)
+    assert said in printed(result.exception)
 
 
 class LateGps(Hover):

@@ -16,7 +16,7 @@ from flownav.core.measurement import Measurement, Sensor
 from flownav.estimation.states import POSITION, QUATERNION, STATE, VELOCITY
 from flownav.live.answers import estimate_of
 from flownav.live.byte_links import SerialLink, TcpLink, open_link
-from flownav.live.filtering import BATCH, Filtering, Keeper
+from flownav.live.filtering import BATCH_READINGS, Filtering, Keeper
 from flownav.live.horizon import SILENT_S, Horizon, Source, Sources, Waiting
 from flownav.live.link import Address, parse_url
 from flownav.live.loop import Latency
@@ -187,8 +187,8 @@ def test_the_estimate_of_now_is_where_the_filter_will_be_when_it_gets_there():
     coming = [imu(1.0 + 0.01 * k) for k in range(30)]
     filtering = Filtering(Options(), Keeper())
     filtering.begin(past, gps_heard=True)
-    for start in range(0, len(past), BATCH):
-        filtering.feed(past[start : start + BATCH])
+    for start in range(0, len(past), BATCH_READINGS):
+        filtering.feed(past[start : start + BATCH_READINGS])
     for waiting in coming:
         filtering.heard(waiting)
     on = filtering.running

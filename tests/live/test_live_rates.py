@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from flownav.live.byte_links import SerialLink, open_link
 from flownav.live.link import MOST_WAITING, Outgoing, message_id_of, parse_url
-from flownav.live.rates import LOOK_S, SHARE, STREAMS, Rates, bytes_of, plan
+from flownav.live.rates import LINE_SHARE, LOOK_S, STREAMS, Rates, bytes_of, plan
 from flownav.live.screen import Traffic, in_words, traffic_facts
 from flownav.logs.mavlink.framing import ARDUPILOT, PX4, StreamFrames, coder
 from live_ends import Hover, Wire
@@ -48,7 +48,7 @@ def test_ardupilot_is_sent_none_that_it_would_drop():
 @given(baud=st.integers(57_600, 3_000_000), truth=st.booleans())
 def test_what_is_asked_for_fits_and_keeps_what_the_navigator_needs(make, send, signed, baud, truth):
     found = plan(make, baud / 10, send, signed=signed, beside=TRUTH if truth else None)
-    if found.bytes_s > SHARE * baud / 10:
+    if found.bytes_s > LINE_SHARE * baud / 10:
         assert signed
         assert baud < 60_000
         assert "the least rates" in found.lacks

@@ -19,7 +19,7 @@ import pytest
 from flownav.live import display as shown
 from flownav.live import loop
 from flownav.live.display import Display, View
-from flownav.live.filtering import BATCH, Keeper
+from flownav.live.filtering import BATCH_READINGS, Keeper
 from flownav.live.loop import COLLECT_S, Collector, Latency, run_session, stoppable
 from flownav.live.options import Options
 from flownav.live.screen import Screen
@@ -63,9 +63,9 @@ def test_what_was_listened_to_is_fed_in_slices_and_nothing_is_sent_meanwhile():
     wire.session.filtering.feed = feed
     wire.fly(5.0)
     wire.close()
-    assert fed[:3] == [BATCH] * 3  # two seconds at 230 Hz wait
-    assert max(fed) == BATCH
-    last = max(place for place, count in enumerate(fed) if count == BATCH)
+    assert fed[:3] == [BATCH_READINGS] * 3  # two seconds at 230 Hz wait
+    assert max(fed) == BATCH_READINGS
+    last = max(place for place, count in enumerate(fed) if count == BATCH_READINGS)
     assert last > 4
     assert sent[last] == 0
     assert wire.session.sent > 100

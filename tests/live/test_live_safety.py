@@ -416,7 +416,7 @@ def test_what_flownav_sent_itself_is_not_taken_when_it_comes_back(wires):
 
 @pytest.mark.parametrize("text", ["", "LANDING_TARGET", "LANDING_TARGET=1", "LANDING_TARGET=1.256", "NO_SUCH=1.1"])
 def test_what_accepts_nothing_is_one_line(text):
-    with pytest.raises(InputError, match=f"--accept {text}: "):
+    with pytest.raises(InputError, match=f"accept {text}: "):
         accepted_of(text)
 
 

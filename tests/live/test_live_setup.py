@@ -16,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
+from command import printed
 from fake_autopilot import ARDUPILOT, PX4, FakeAutopilot, FakeLink
 from flownav.cli import app
 from flownav.core.errors import InputError
@@ -27,8 +28,7 @@ from flownav.live.setup.check import check
 from flownav.live.setup.compare import baud_of
 from flownav.live.setup.knowledge import MAKES, knowledge_of
 from flownav.live.setup.talk import TRIES, Talk, read
-from flownav.logs.mavlink.framing import coder, dialect
-from flownav.logs.mavlink.parameters import INTEGERS, Value, decoded, name_of, set_value
+from flownav.logs.mavlink.framing import INTEGERS, Value, coder, decoded, dialect, name_of, set_value
 from recorded_link import frames_of
 
 UDP = parse_url("udp:14550")
@@ -532,4 +532,4 @@ def test_mistakes_are_one_line(options, said, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     result = CliRunner().invoke(app, ["live", "udp:0", *options])
     assert isinstance(result.exception, InputError)
-    assert said in str(result.exception)
+    assert said in printed(result.exception)

@@ -6,7 +6,7 @@ import pytest
 
 from flownav.live.filtering import Keeper
 from flownav.live.options import Options
-from flownav.live.requests import HIL, MOST_QUESTIONS, SET_MESSAGE_INTERVAL, SILENT_S
+from flownav.live.requests import HIL_FLAG, MOST_QUESTIONS, SET_MESSAGE_INTERVAL, SILENT_S
 from flownav.live.session import Session
 from flownav.logs.mavlink import outgoing as say
 from flownav.logs.mavlink.framing import coder
@@ -87,7 +87,7 @@ def test_a_vehicle_is_not_asked_for_it():
 
 
 def test_px4s_simulator_says_so_in_its_heartbeat():
-    assert 115 in Autopilot(PX4, simulated=True, base_mode=HIL).live(3.0).asked
+    assert 115 in Autopilot(PX4, simulated=True, base_mode=HIL_FLAG).live(3.0).asked
     vehicle = Autopilot(PX4, simulated=False).live(3.0)
     assert 115 not in vehicle.asked
     assert vehicle.parameters_asked == 0

@@ -10,7 +10,7 @@ from flownav.core.frames import quaternion_from_euler
 from flownav.core.measurement import Sensor, Stream
 from flownav.logs.blackbox.format import headers
 from flownav.logs.blackbox.frames import read_frames
-from flownav.logs.frames import attitude_at, attitude_rates, mean_over
+from flownav.logs.log import attitude_at, attitude_rates, mean_over
 
 WRAP_US = 1 << 32
 STEP_US = 20_000_000  # some three and a half minutes between frames: so a few hundred of them see two wraps

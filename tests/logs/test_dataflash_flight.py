@@ -14,8 +14,7 @@ from flownav.core.measurement import Sensor, Stream
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.dataflash import read_dataflash
-from flownav.logs.frames import attitude_at
-from flownav.logs.log import Log
+from flownav.logs.log import Log, attitude_at
 from replay_logs import ORIGIN, SyntheticLog, log_of_flight
 
 REAL = Path("dataflash") / "heli_sitl_takeoff_square_land.bin"

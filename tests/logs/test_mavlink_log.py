@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
-from flownav.logs.frames import attitude_rates
-from flownav.logs.log import INSTEAD
+from flownav.logs.log import INSTEAD, attitude_rates
 from flownav.logs.mavlink.framing import coder
 from flownav.logs.mavlink.signing import sign_outgoing
 from flownav.logs.mavlink_log import WANTED, read_tlog
@@ -484,7 +483,7 @@ def test_the_helicopters_flow_is_truths_flow(helicopter):
 
 def test_the_helicopters_log_replays(helicopter):
     result = replay(helicopter, ReplayOptions(), NavigatorSettingsFile())
-    scores = result.truth_scores()
+    scores = result.scores()["truth"]
     assert scores["horizontal_rms_m"] < 1.0
     assert scores["vertical_rms_m"] < 1.0
 

@@ -33,9 +33,9 @@ def test_a_folder_a_ulog_and_a_dataflash_log_open_as_the_same_streams(tmp_path):
         pytest.approx(5.0 + starts[0]),
         pytest.approx(40.0 + starts[0]),
     ]
-    with pytest.raises(InputError, match=r"--flow-instance: .*csv is a folder of CSV files"):
+    with pytest.raises(InputError, match=r"flow_instance: .*csv is a folder of CSV files"):
         open_log(folder, flow_instance=0)
-    with pytest.raises(InputError, match="--flow-instance 3 is not in the log"):
+    with pytest.raises(InputError, match="flow_instance 3 is not in the log"):
         open_log(file, flow_instance=3)
 
 

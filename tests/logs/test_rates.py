@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from flownav.core.measurement import Sensor, Stream
-from flownav.logs.frames import attitude_at, attitude_rates, mean_over
+from flownav.logs.log import attitude_at, attitude_rates, mean_over
 
 
 def turned(rotations: Rotation, t_s: np.ndarray) -> Stream:

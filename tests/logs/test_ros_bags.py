@@ -12,8 +12,7 @@ from fed_records import queue_of_flight, record_of
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
 from flownav.export.formats import export
-from flownav.logs.frames import frd, ned, ned_from_frd, ned_from_frd_of_nwu
-from flownav.logs.log import Log
+from flownav.logs.log import Log, frd, ned, ned_from_frd, ned_from_frd_of_nwu
 from flownav.logs.open_log import log_kind, open_flight, open_log
 from flownav.logs.ros.bag import Bag
 from flownav.logs.ros.containers import messages
@@ -170,11 +169,11 @@ def test_of_several_topics_one_is_taken_and_a_note_says_which_and_why(flown, tmp
     asked = read_ros(bag, topics={"flow": "/second/flow"})
     assert len(asked.streams[Sensor.FLOW_RATE]) == len(second.streams[Sensor.FLOW_RATE])
     assert "flow is /second/flow, as asked" in asked.notes
-    with pytest.raises(InputError, match=r"--flow-instance 2: the bag's flow topics are 0 \(/mavros"):
+    with pytest.raises(InputError, match=r"flow_instance 2: the bag's flow topics are 0 \(/mavros"):
         open_log(bag, flow_instance=2)
-    with pytest.raises(InputError, match="--topic imu=/none: no such topic; for imu the bag has /camera/imu, /mavros"):
+    with pytest.raises(InputError, match="topics imu=/none: no such topic; for imu the bag has /camera/imu, /mavros"):
         read_ros(bag, topics={"imu": "/none"})
-    with pytest.raises(InputError, match="--topic sonar=/x: the roles are imu, gps"):
+    with pytest.raises(InputError, match="topics sonar=/x: the roles are imu, gps"):
         read_ros(bag, topics={"sonar": "/x"})
 
 

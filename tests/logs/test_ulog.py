@@ -151,9 +151,9 @@ def test_of_several_flow_sensors_the_one_that_saw_most_is_read_unless_asked(tmp_
         "flow is vehicle_optical_flow[1]; not used: vehicle_optical_flow[0] (200 readings)"
         in read(writer, tmp_path).notes
     )
-    with pytest.raises(InputError, match=r"--flow-instance 7 is not in the log; it has vehicle_optical_flow\[0\], "):
+    with pytest.raises(InputError, match=r"flow_instance 7 is not in the log; it has vehicle_optical_flow\[0\], "):
         read(writer, tmp_path, flow_instance=7)
-    with pytest.raises(InputError, match="--flow-instance 0 is not in the log; it has no optical flow at all"):
+    with pytest.raises(InputError, match="flow_instance 0 is not in the log; it has no optical flow at all"):
         read(with_attitude(), tmp_path, flow_instance=0)
 
 

@@ -10,7 +10,7 @@ import pytest
 from flownav.core.compile import LANES, LANES_WIDE
 from flownav.core.frames import GRAVITY_M_S2
 from flownav.core.measurement import MAX_VALUES, EventQueue, Sensor, Stream, merge
-from flownav.estimation.packed import unpack
+from flownav.estimation.consistency import unpack
 from flownav.estimation.states import QUATERNION, STATE, STATES
 from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.memory import READING, load_start, new_work

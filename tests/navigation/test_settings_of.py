@@ -13,10 +13,8 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import noise_of, of_gps_receiver, of_inertial, of_magnetometer, settings_of
 from flownav.navigation.told import NO_HEADING, NO_STATED_NOISE, Equipment
 from flownav.sensors.datasheet import load_sensor
-from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
-from flownav.sensors.inertial_sheet import InertialSheet, Vibration
 from flownav.sensors.magnetometer import MagneticField, MagnetometerSheet
-from flownav.sensors.sheets import shipped_sheets
+from flownav.sensors.sheets import GpsReceiverSheet, InertialSheet, Vibration, shipped_sheets
 
 FITTED = Equipment(True, False, NO_HEADING, False, -math.inf)
 

@@ -15,7 +15,7 @@ from flownav.core.compile import ONE_LANE
 from flownav.core.frames import quaternion_product
 from flownav.core.measurement import Sensor
 from flownav.core.record import PROTECTION_LEVELS, Record
-from flownav.estimation.packed import unpack
+from flownav.estimation.consistency import unpack
 from flownav.estimation.states import ATTITUDE, BARO, CONSIDERS, FORCE, GROUND, MIDDLE, QUATERNION, STATE, STATES
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.log import Log

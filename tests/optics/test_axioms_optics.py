@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 
 from flownav.lab.optics.camera import Lens, field_angle_rad, illumination, image_radius_px, pixels_of, rays_of
-from flownav.lab.optics.plane_pose import homography, mapped, plane_pose
 from flownav.lab.optics.projection import (
     FlightMotion,
     ground_point,
+    homography,
     image_point,
+    mapped,
     moved,
     part_time_s,
+    plane_pose,
     pose_looking_down,
     row_time_s,
 )

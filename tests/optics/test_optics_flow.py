@@ -11,7 +11,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from flownav.cli import flow as flow_command
+from flownav.cli import identify as flow_command
 from flownav.core.errors import InputError
 from flownav.lab.optics.camera import Camera, effective_focal_px
 from flownav.lab.optics.firmware import VERSIONS, firmware_named
@@ -160,7 +160,7 @@ def test_frames_can_be_binned_and_cut() -> None:
 
 def run(*arguments: object) -> dict[str, object]:
     app = typer.Typer()
-    app.command()(flow_command.command)
+    app.command()(flow_command.flow)
     result = CliRunner().invoke(app, [*map(str, arguments), "--json"], catch_exceptions=False)
     assert result.exit_code == 0, result.output
     return json.loads(result.stdout)

@@ -31,8 +31,7 @@ from flownav.lab.optics.pad import (
     printed_cells,
 )
 from flownav.lab.optics.pad_fix import PadSearch, find_pad, fix_error, is_wrong, truth_of
-from flownav.lab.optics.plane_pose import homography, plane_pose
-from flownav.lab.optics.projection import Pose, pose_looking_down
+from flownav.lab.optics.projection import Pose, homography, plane_pose, pose_looking_down
 from flownav.lab.optics.render import film
 
 CLEAN = {"read_noise_grey": 0.0, "photon_noise_grey": 0.0}

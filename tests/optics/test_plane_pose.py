@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from flownav.lab.optics.plane_pose import homography, mapped, plane_pose
+from flownav.lab.optics.projection import homography, mapped, plane_pose
 
 SQUARE = 0.2 * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
 

@@ -18,8 +18,9 @@ from browsing import CHROMIUM, QUIET, SOFTWARE_GL, Visit
 from flownav.cli import paper as paper_command
 from flownav.core.errors import InputError, VerdictError
 from flownav.lab.rig.experiment import RigSettings, run_experiment
-from flownav.paper import figures_tables, findings, laboratory, published
+from flownav.paper import findings, laboratory, published
 from flownav.paper.laboratory import Configuration
+from flownav.paper.page import panels
 from flownav.paper.published import HEIGHTS_M, ErrorRow
 from flownav.paper.reproduction import reproduce
 from flownav.sensors.datasheet import Dynamics
@@ -344,7 +345,7 @@ def test_the_caption_of_figure_28_says_where_the_transient_comes_from() -> None:
     assert 0.3 < of.unshaken_m_s.min() < of.shaken_m_s.max() < 0.8
     facts = of.as_json()
     assert facts["flights"] == 16
-    (figure,) = (panel for panel in figures_tables.panels(flown) if panel.key == "figure-28")
+    (figure,) = (panel for panel in panels(flown) if panel.key == "figure-28")
     assert f"{facts['unshaken_m_s']['median']:.3f} m/s in the same flights" in figure.caption
     assert f"{100.0 * facts['frozen_inflow_share']['median']:.0f} % of the transient" in figure.caption
     (landing,) = reproduce((6,), 1, 16).flights

@@ -49,7 +49,7 @@ def test_a_log_fed_in_parts_is_the_log_fed_at_once(tmp_path, monkeypatch):
     options = ReplayOptions(gps_outages_s=((10.0, 20.0),))
     whole = replay(log, options, NavigatorSettingsFile())
     monkeypatch.setattr(prepare, "KEPT_QUEUE", 100)
-    monkeypatch.setattr(prepare, "PART", 777)
+    monkeypatch.setattr(prepare, "MERGED_EVENTS", 777)
     parts = replay(log, options, NavigatorSettingsFile())
     assert parts.estimate.tobytes() == whole.estimate.tobytes()
     assert np.array_equal(parts.innovation, whole.innovation, equal_nan=True)

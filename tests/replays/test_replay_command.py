@@ -10,6 +10,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from command import printed
 from flownav.cli.replay import command
 from flownav.core.errors import InputError
 from flownav.core.record import POSITION_NED, QUATERNION, Record
@@ -43,7 +44,7 @@ def complaint(*arguments) -> str:
     assert isinstance(result.exception, InputError), result.exception
     assert result.stdout == ""
     assert not list(Path.cwd().rglob("*.fnr"))
-    text = str(result.exception)
+    text = printed(result.exception)
     assert "\n" not in text
     return text
 
@@ -206,7 +207,7 @@ def test_people_get_tables_and_files(folder):
 def test_a_wrong_option_is_one_line_and_leaves_no_file(folder, arguments, said):
     result = call(folder, *arguments)
     assert isinstance(result.exception, InputError), result.exception
-    assert said in str(result.exception)
+    assert said in printed(result.exception)
     assert "\n" not in str(result.exception)
     assert list(Path.cwd().iterdir()) == []
 

@@ -62,7 +62,7 @@ def test_fourteen_minutes_without_gps(outdoor):
 
 def test_gps_aided_velocity_agrees_with_gps_and_hardly_anything_is_rejected(outdoor):
     run = replay(outdoor, ReplayOptions(), NavigatorSettingsFile())
-    velocity = run.velocity_rms()
+    velocity = run.scores()["velocity_rms_m_s"]
     assert velocity is not None
     assert velocity < 0.25
     rows = run.innovation
@@ -126,7 +126,7 @@ def test_against_motion_capture(mocap):
     """50 s by a sensor whose scale is 0.75 and whose noise is larger than the motion: the path stays within 0.4 m."""
     value = mocap.streams[Sensor.FLOW_VELOCITY].value * [-1.0, -1.0, 1.0]  # identified: both signs are inverted
     mended = changed(mocap, Sensor.FLOW_VELOCITY, value=value)
-    truth = replay(mended, ReplayOptions(), NavigatorSettingsFile()).truth_scores()
+    truth = replay(mended, ReplayOptions(), NavigatorSettingsFile()).scores()["truth"]
     assert truth is not None
     assert truth["horizontal_rms_m"] < 0.4
     assert truth["vertical_rms_m"] < 0.4

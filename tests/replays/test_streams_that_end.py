@@ -11,7 +11,7 @@ from flownav.logs.open_log import open_log
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
-from flownav.studies.inspection.summary import summarise
+from flownav.studies.inspection import summarise
 from replay_logs import log_of_flight
 from ulog_files import ulog_of_flight
 

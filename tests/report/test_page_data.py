@@ -14,7 +14,7 @@ from hypothesis.extra.numpy import arrays
 
 from flownav.report.chart import LINE_POINTS, Stack
 from flownav.report.html import HERE
-from flownav.report.page_data import DIGITS, SMALLEST, Columns, chart_data
+from flownav.report.page_data import DECIMALS, SMALLEST, Columns, chart_data
 
 
 def unpacked(columns: Columns) -> list[np.ndarray]:
@@ -46,7 +46,7 @@ def test_every_column_comes_back_to_a_millionth_of_its_largest_value(given_colum
         largest = np.abs(values[finite]).max(initial=0.0)
         assert np.array_equal(np.isnan(found[place]), ~finite)
         assert (
-            np.abs(found[place][finite] - values[finite]).max(initial=0.0) <= 0.51 * largest * 10.0**-DIGITS + SMALLEST
+            np.abs(found[place][finite] - values[finite]).max(initial=0.0) <= 0.51 * largest / 10.0**DECIMALS + SMALLEST
         )
 
 

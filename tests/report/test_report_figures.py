@@ -17,8 +17,7 @@ from flownav.report.content import summary, tiles
 from flownav.report.figures_errors import close_ups, error_against_gps, flown_errors, position_error
 from flownav.report.figures_filter import consistency, radius_of_uncertainty
 from flownav.report.figures_innovation import innovations
-from flownav.report.figures_path import ground_track, path_over_pad, paths_of
-from flownav.report.figures_states import attitude, position, velocity
+from flownav.report.figures_states import attitude, ground_track, path_over_pad, paths_of, position, velocity
 from flownav.report.html import render, sections
 from flownav.report.page_data import Columns, paths_data
 from flownav.report.panels import Panel

@@ -15,9 +15,8 @@ from typer.testing import CliRunner
 from flownav.cli import rig as rig_command
 from flownav.core.errors import InputError
 from flownav.lab.optics.firmware import VERSIONS
-from flownav.lab.rig.experiment import RigLog, RigSettings, run_campaign, run_experiment
+from flownav.lab.rig.experiment import COLUMNS, RigLog, RigSettings, run_campaign, run_experiment
 from flownav.lab.rig.instruments import gyro_at, messages, sonar_at
-from flownav.lab.rig.log_folder import COLUMNS
 
 SHORT = RigSettings(duration_s=6.0)
 OLD = VERSIONS["2013-09"]

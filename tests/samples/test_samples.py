@@ -13,15 +13,14 @@ from typer.testing import CliRunner
 from flownav.cli import app
 from flownav.core.errors import InputError
 from flownav.core.record import Record
-from flownav.export.samples.kinds import KINDS, SAMPLES, sample_of
-from flownav.export.samples.writing import README, write_samples
+from flownav.export.samples.kinds import KINDS, README, SAMPLES, sample_of, write_samples
 from flownav.lab.identification.descent import Structure
 from flownav.lab.identification.flight_identification import identify_flight
 from flownav.logs.open_log import open_flight
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import Replay, replay
-from flownav.studies.inspection.summary import summarise
+from flownav.studies.inspection import summarise
 
 FLIGHTS = {"csv": "flight-csv", "ulog": "flight.ulg", "tlog": "flight.tlog", "dataflash": "flight.bin"}
 MOST_BYTES = 5_000_000
@@ -75,7 +74,7 @@ def test_every_format_replays_to_the_same_flight(replays):
 
 
 def _rms(flown: Replay, name: str) -> float:
-    scores = flown.truth_scores()
+    scores = flown.scores()["truth"]
     assert scores is not None
     return float(scores[name])
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from flownav.core.record import Record
-from flownav.scoring.by_phase import rejected_mostly_in, scores_by_phase
 from flownav.scoring.phases import NAMES, Phase, phase_at, phases_of
+from flownav.scoring.recorded import rejected_mostly_in, scores_by_phase
 
 # from, to [s]; north at the end, height at the end: ground, climb, hover, transit, hover, approach, ground
 LEGS = (

@@ -37,7 +37,6 @@ from flownav.sensors.gps_receiver import (
     start_gps_receiver,
     step_gps_receiver,
 )
-from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
 from flownav.sensors.inertial import (
     ImuReading,
     InertialNormals,
@@ -46,7 +45,6 @@ from flownav.sensors.inertial import (
     start_inertial,
     step_inertial,
 )
-from flownav.sensors.inertial_sheet import InertialSheet
 from flownav.sensors.magnetometer import (
     MagnetometerNormals,
     MagnetometerParameters,
@@ -63,6 +61,7 @@ from flownav.sensors.range_sensor import (
     wide_beam,
 )
 from flownav.sensors.settings import FlowSettings
+from flownav.sensors.sheets import GpsReceiverSheet, InertialSheet
 from sensor_normals import silent
 
 SEEDS = pytest.mark.parametrize("seed", range(6))

@@ -22,7 +22,7 @@ from flownav.sensors.gps_receiver import (
     start_gps_receiver,
     step_gps_receiver,
 )
-from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
+from flownav.sensors.sheets import GpsReceiverSheet
 from sensor_normals import draws, moved_by, silent
 
 SHEET = GpsReceiverSheet.read()

@@ -21,7 +21,7 @@ from flownav.sensors.inertial import (
     start_inertial,
     step_inertial,
 )
-from flownav.sensors.inertial_sheet import InertialSheet
+from flownav.sensors.sheets import InertialSheet
 from sensor_normals import draws, moved_by, silent
 
 HOVER = ImuReading(0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2)

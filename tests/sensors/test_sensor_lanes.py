@@ -23,7 +23,7 @@ from flownav.sensors.gps_ins import (
     step_gps_ins,
 )
 from flownav.sensors.inertial import ImuReading
-from flownav.sensors.rangefinder import (
+from flownav.sensors.range_sensor import (
     RangefinderParameters,
     RangefinderState,
     RangeReading,

@@ -9,7 +9,7 @@ import pytest
 
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import check
-from flownav.sensors.rangefinder import (
+from flownav.sensors.range_sensor import (
     PERIOD_S,
     RangefinderParameters,
     RangeReading,

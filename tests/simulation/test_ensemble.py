@@ -13,7 +13,7 @@ from flownav.core.parameter_files import check, shipped
 from flownav.simulation.assemble import assemble
 from flownav.simulation.dispersion import Distribution, drawn, uniforms
 from flownav.simulation.engine import fly_blocks, fly_one, fly_written
-from flownav.simulation.ensemble import TOGETHER, believed
+from flownav.simulation.ensemble import LOT_FLIGHTS, believed
 from flownav.simulation.history import column, columns
 from flownav.simulation.scenario import SHIPPED, Scenario, load_scenario
 from flownav.simulation.truth import Truth
@@ -116,12 +116,12 @@ def test_nobody_is_told(tmp_path):
 def test_a_flight_of_an_ensemble_is_the_same_bytes_alone_in_any_batch_and_on_any_lane(filter_):
     ready = setup("approach", flight=SHORT, filter=filter_)
     flight, ensemble, again = ready.flight, ready.ensemble(), ready.ensemble()
-    by_itself = [fly_one(flight, 5, k, ensemble)[:, :, 0] for k in range(TOGETHER - 2, TOGETHER + 3)]
-    for threads, first in ((1, TOGETHER - 2), (2, TOGETHER - 7)):
+    by_itself = [fly_one(flight, 5, k, ensemble)[:, :, 0] for k in range(LOT_FLIGHTS - 2, LOT_FLIGHTS + 3)]
+    for threads, first in ((1, LOT_FLIGHTS - 2), (2, LOT_FLIGHTS - 7)):
         blocks = [block for _, block in fly_blocks(flight, 5, first, 20, np.copy, threads, again)]
         together = np.concatenate(blocks, axis=2)
         for k, history in enumerate(by_itself):
-            assert np.array_equal(together[:, :, TOGETHER - 2 - first + k], history, equal_nan=True), (first, k)
+            assert np.array_equal(together[:, :, LOT_FLIGHTS - 2 - first + k], history, equal_nan=True), (first, k)
 
 
 def test_without_dispersion_an_ensemble_has_the_bytes_of_matched_flights(tmp_path):

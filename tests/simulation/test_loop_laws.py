@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 from flownav.control.autopilot import Estimate
-from flownav.control.go_around import Knowledge
-from flownav.control.guidance import Reference
+from flownav.control.go_around import Knowledge, Reference
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, to_earth
-from flownav.estimation.consistency import normalised_error
+from flownav.estimation.consistency import normalised_error, pack
 from flownav.estimation.named import Attitude, PositionNed, VelocityNed
-from flownav.estimation.packed import pack
 from flownav.estimation.states import STATE, STATES
 from flownav.navigation.memory import new_work
 from flownav.navigation.records import GroundMemory, Reading, StartMemory, SuspicionMemory

@@ -20,8 +20,7 @@ from flownav.simulation.plant import step_vehicle
 from flownav.simulation.scenario import load_scenario, with_filter, with_vehicle
 from flownav.simulation.truth import packed_truth
 from flownav.vehicle import multirotor
-from flownav.vehicle.around import CALM
-from flownav.vehicle.state import Controls
+from flownav.vehicle.state import CALM, Controls
 
 QUAD, HEXA = "quad-450", "hexa-550"
 FLOWN = 96

@@ -15,8 +15,7 @@ from flownav.simulation.plant import linear_step, place, runge_kutta_step
 from flownav.simulation.scenario import Scenario, load_scenario
 from flownav.simulation.truth import packed_truth
 from flownav.vehicle import helicopter
-from flownav.vehicle.around import CALM
-from flownav.vehicle.state import Controls, HelicopterState
+from flownav.vehicle.state import CALM, Controls, HelicopterState
 
 
 @kernel

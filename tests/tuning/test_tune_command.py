@@ -12,6 +12,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from command import printed
 from flownav.cli import replay
 from flownav.cli.compare import tune_settings
 from flownav.core.errors import InputError
@@ -170,7 +171,7 @@ def test_a_mistake_is_one_line_and_leaves_no_file(logs, tmp_path, arguments, sai
     places = {name.upper(): logs / name for name in ("long", "short", "lame")}
     result = call(*(places.get(argument, argument) for argument in arguments))
     assert isinstance(result.exception, InputError), result.exception
-    assert said in str(result.exception)
+    assert said in printed(result.exception)
     assert "\n" not in str(result.exception)
     assert result.stdout == ""
     assert sorted(path.name for path in tmp_path.iterdir() if path.name != "out") == before
@@ -188,5 +189,5 @@ def test_a_log_in_which_nothing_is_predicted_says_so(logs, tmp_path):
     write_table(blind / "landed.csv", {"t_s": t_s, "landed": (t_s < 3.0).astype(float)})
     result = call(blind)
     assert isinstance(result.exception, InputError), result.exception
-    assert "nothing can be tuned" in str(result.exception)
+    assert "nothing can be tuned" in printed(result.exception)
     assert "\n" not in str(result.exception)

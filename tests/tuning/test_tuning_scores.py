@@ -14,7 +14,7 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import ReplayOptions
 from flownav.studies.tuning.scores import (
     LEAST_SHARE,
-    LOSS,
+    LOSS_NATS,
     SENSORS,
     Scores,
     _flow_errors,
@@ -125,10 +125,10 @@ def test_gains_are_nats_over_the_start_and_great_ones_count_less():
 
 def test_nobody_gains_by_predicting_less():
     fewer = gains_of(scores(density=5.0, readings=100.0 * LEAST_SHARE - 1.0), scores())
-    assert fewer.prediction == pytest.approx([tempered(LOSS)] * 2)
+    assert fewer.prediction == pytest.approx([tempered(LOSS_NATS)] * 2)
     nothing = gains_of(scores(density=np.nan, error=np.nan), scores())
-    assert nothing.prediction == pytest.approx([tempered(LOSS)] * 2)
-    assert nothing.error[0] == pytest.approx(tempered(LOSS))
+    assert nothing.prediction == pytest.approx([tempered(LOSS_NATS)] * 2)
+    assert nothing.error[0] == pytest.approx(tempered(LOSS_NATS))
 
 
 @pytest.mark.parametrize(("sensors", "truth", "named", "gps_cuts", "flow_cuts"), [

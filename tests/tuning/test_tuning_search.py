@@ -12,10 +12,9 @@ from flownav.core.measurement import COLUMNS, Sensor, Stream
 from flownav.logs.log import Log
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.studies.tuning.job import proposals
-from flownav.studies.tuning.judge import ACCEPTED, NOT_ACCEPTED, interval_of, judge, judged, resampled
 from flownav.studies.tuning.knobs import KNOBS, MOST_NOISE, knobs_of, limits_of, rounded, turned
 from flownav.studies.tuning.scores import Gains
-from flownav.studies.tuning.search import Found, search
+from flownav.studies.tuning.search import ACCEPTED, NOT_ACCEPTED, Found, interval_of, judge, judged, resampled, search
 
 SETTINGS = NavigatorSettingsFile()
 NOISES = [knob for knob in KNOBS if knob.name in ("gyro noise", "accelerometer noise", "range noise")]

@@ -14,8 +14,8 @@ from flownav.replays.session import replay
 from flownav.sensors import flow, inertial
 from flownav.sensors.datasheet import load_sensor
 from flownav.sensors.inertial import ImuReading
-from flownav.sensors.inertial_sheet import InertialSheet
 from flownav.sensors.settings import FlowSettings
+from flownav.sensors.sheets import InertialSheet
 from flownav.studies.validation.drawn import Flight, drawn_sheets, kept_of, load_flights, sheets_of
 from flownav.studies.validation.path import path_of
 from flownav.studies.validation.sensed import every_nth, field_of, seen_velocity, simulated_log, step_of, stepped

@@ -10,12 +10,11 @@ import pytest
 from flownav.core.frames import rotation_from_quaternion
 from flownav.vehicle import airframe, drive, helicopter, multirotor
 from flownav.vehicle.airframe import angular_acceleration, linear_acceleration
-from flownav.vehicle.around import CALM
 from flownav.vehicle.kinds import load_vehicle
 from flownav.vehicle.motors import battery_voltage, propeller_load, shaft_power
 from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters
 from flownav.vehicle.skids import Support, with_friction, with_support
-from flownav.vehicle.state import Controls, RotorLoads
+from flownav.vehicle.state import CALM, Controls, RotorLoads
 from flownav.vehicle.trim import settled, trim
 
 QUAD: MultirotorParameters = load_vehicle(Path("quad-450"))  # type: ignore[assignment]

@@ -11,11 +11,10 @@ import pytest
 from flownav.core.compile import squared
 from flownav.core.frames import quaternion_product, rotation_from_quaternion, to_body
 from flownav.vehicle import airframe, helicopter, multirotor
-from flownav.vehicle.around import CALM, Around
 from flownav.vehicle.kinds import load_vehicle
 from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters
 from flownav.vehicle.skids import support
-from flownav.vehicle.state import Controls, HelicopterState, MultirotorState, Six
+from flownav.vehicle.state import CALM, Around, Controls, HelicopterState, MultirotorState, Six
 from flownav.vehicle.trim import trim_multirotor
 
 QUAD: MultirotorParameters = load_vehicle(Path("quad-450"))  # type: ignore[assignment]

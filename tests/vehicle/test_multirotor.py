@@ -14,7 +14,6 @@ from scipy.optimize import brentq
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import read_toml
 from flownav.vehicle import airframe, multirotor
-from flownav.vehicle.around import CALM, in_wind
 from flownav.vehicle.feasibility import require_multirotor
 from flownav.vehicle.kinds import flattened, load_vehicle, read_kind, vehicle_file
 from flownav.vehicle.motors import battery_voltage, mixed, propeller_load, root_of_share, told_speed
@@ -26,7 +25,7 @@ from flownav.vehicle.parameters import (
     with_inflow_held,
 )
 from flownav.vehicle.rotor import multiplier
-from flownav.vehicle.state import Controls, HelicopterState, MultirotorState
+from flownav.vehicle.state import CALM, Controls, HelicopterState, MultirotorState, in_wind
 from flownav.vehicle.trim import parked_multirotor, settled, trim_multirotor
 
 NAME = Path("quad-450")

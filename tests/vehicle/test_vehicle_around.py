@@ -9,10 +9,9 @@ import pytest
 
 from flownav.core.frames import rotation_from_quaternion
 from flownav.vehicle import helicopter, multirotor
-from flownav.vehicle.around import CALM, below_plane, in_wind, plane_normal
 from flownav.vehicle.kinds import load_vehicle
 from flownav.vehicle.skids import support
-from flownav.vehicle.state import Controls
+from flownav.vehicle.state import CALM, Controls, below_plane, in_wind, plane_normal
 from flownav.vehicle.trim import parked, trim, trim_multirotor
 
 VEHICLE = load_vehicle()

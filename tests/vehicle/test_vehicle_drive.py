@@ -11,11 +11,11 @@ from flownav.control.design import gains_for
 from flownav.control.margins import LEAST_GAIN_DB, LEAST_PHASE_DEG, margins_of
 from flownav.core.errors import InputError
 from flownav.vehicle import airframe, helicopter
-from flownav.vehicle.around import CALM
 from flownav.vehicle.corners import NOMINAL, corners
 from flownav.vehicle.drive import shaft_power
 from flownav.vehicle.kinds import load_vehicle
 from flownav.vehicle.linearize import hover_plant, rotor_plant
+from flownav.vehicle.state import CALM
 from flownav.vehicle.trim import trim
 
 VEHICLE = load_vehicle()

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, to_body
-from flownav.vehicle.around import CALM
 from flownav.vehicle.helicopter import outputs
 from flownav.vehicle.kinds import load_vehicle
 from flownav.vehicle.rotor import multiplier
+from flownav.vehicle.state import CALM
 from flownav.vehicle.trim import trim
 
 R, V_I = 0.89, 3.57

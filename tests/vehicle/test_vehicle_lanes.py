@@ -7,10 +7,9 @@ import numpy as np
 
 from flownav.core.compile import LANES, ONE_LANE, lane_access, stepping
 from flownav.vehicle import helicopter
-from flownav.vehicle.around import in_wind
 from flownav.vehicle.helicopter import derivative
 from flownav.vehicle.kinds import load_vehicle
-from flownav.vehicle.state import Controls, HelicopterState, normalised
+from flownav.vehicle.state import Controls, HelicopterState, in_wind, normalised
 from flownav.vehicle.trim import parked, trim
 
 FIELDS = len(HelicopterState._fields)

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from flownav.vehicle import airframe, helicopter
-from flownav.vehicle.around import CALM, in_wind
 from flownav.vehicle.complex_step import jacobian, solve
 from flownav.vehicle.kinds import load_vehicle
 from flownav.vehicle.linearize import INPUTS, STATES, eigenvalues, load_paper_model, reduced_model
-from flownav.vehicle.state import Controls, HelicopterState
+from flownav.vehicle.state import CALM, Controls, HelicopterState, in_wind
 from flownav.vehicle.trim import trim
 
 VEHICLE = load_vehicle()

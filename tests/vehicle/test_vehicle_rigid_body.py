@@ -7,10 +7,9 @@ import pytest
 
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion
 from flownav.vehicle import helicopter
-from flownav.vehicle.around import CALM, in_wind
 from flownav.vehicle.kinds import load_vehicle
 from flownav.vehicle.parameters import without_slop
-from flownav.vehicle.state import Controls, HelicopterState
+from flownav.vehicle.state import CALM, Controls, HelicopterState, in_wind
 from flownav.vehicle.trim import trim
 
 VEHICLE = load_vehicle()

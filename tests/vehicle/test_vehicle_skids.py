@@ -8,9 +8,8 @@ import pytest
 from flownav.core.errors import InputError
 from flownav.core.frames import quaternion_from_euler
 from flownav.vehicle import helicopter, skids
-from flownav.vehicle.around import CALM, in_wind
 from flownav.vehicle.kinds import load_vehicle
-from flownav.vehicle.state import Controls
+from flownav.vehicle.state import CALM, Controls, in_wind
 from flownav.vehicle.trim import parked, trim
 
 VEHICLE = load_vehicle()

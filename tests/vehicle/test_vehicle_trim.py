@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from flownav.core.errors import InputError
 from flownav.core.frames import euler_from_quaternion, quaternion_from_euler
 from flownav.vehicle import helicopter
-from flownav.vehicle.around import CALM, in_wind
 from flownav.vehicle.kinds import load_vehicle
-from flownav.vehicle.state import HelicopterState
+from flownav.vehicle.state import CALM, HelicopterState, in_wind
 from flownav.vehicle.trim import accelerations, trim
 from vehicle_files import X_CELL
 

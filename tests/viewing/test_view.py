@@ -14,8 +14,8 @@ from flownav.cli import app
 from flownav.core.errors import InputError
 from flownav.core.frames import rotation_from_quaternion, to_body, to_earth
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
+from flownav.export.viewing import has_display, write_rrd
 from flownav.export.viewing.shapes import cameras, flow_arrows, vehicle_outline
-from flownav.export.viewing.view import has_display, write_rrd
 from report_records import flight
 
 rr = pytest.importorskip("rerun")
@@ -304,7 +304,7 @@ def test_a_viewer_that_does_not_start_is_one_line(saved, monkeypatch):
     monkeypatch.setattr(rr.RecordingStream, "spawn", fails)
     error = run(saved).exception
     assert isinstance(error, InputError)
-    assert str(error) == "Rerun's viewer does not start (no viewer); give --out FILE.rrd"
+    assert str(error) == "Rerun's viewer does not start (no viewer); `flownav view --out FILE.rrd` writes a file"
 
 
 def test_without_the_package_the_error_says_how_to_get_it(saved, tmp_path, monkeypatch):

@@ -12,14 +12,14 @@ from shutil import rmtree
 from tempfile import mkdtemp
 from typing import Any
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.guard import written_whole
 from flownav.core.text import to_toml
 from flownav.parts.calling import name_of
 from flownav.parts.naming import OURS, part_of, require
 from flownav.parts.protocols import Parts
 
-LONGEST = 200  # characters of one argument
+LONGEST_ARGUMENT = 200  # characters of one argument
 
 
 def call_of(name: str, *arguments: Any, **options: Any) -> str:
@@ -28,7 +28,8 @@ def call_of(name: str, *arguments: Any, **options: Any) -> str:
     Options that stand as the function has them unless told otherwise are left out by `changed`.
     """
     given = [_shown(argument) for argument in arguments]
-    said = {key: value for key, value in options.items() if value is not None and _is_said(value)}
+    empty = {key for key, value in options.items() if isinstance(value, tuple | list | dict) and not value}
+    said = {key: value for key, value in options.items() if value is not None and key not in empty}
     given += [f"{key}={_shown(value)}" for key, value in said.items() if key.isidentifier()]
     dotted = {key: value for key, value in said.items() if not key.isidentifier()}
     given += [f"**{_shown(dotted)}"] if dotted else []
@@ -38,20 +39,13 @@ def call_of(name: str, *arguments: Any, **options: Any) -> str:
 def changed(function: Callable[..., Any], options: Mapping[str, Any]) -> dict[str, Any]:
     """The options that differ from the function's defaults."""
     defaults = {name: parameter.default for name, parameter in inspect.signature(function).parameters.items()}
-    return {name: value for name, value in options.items() if not _same(value, defaults.get(name))}
-
-
-def _same(value: Any, default: Any) -> bool:
-    return type(value) is type(default) and repr(value) == repr(default)
-
-
-def _is_said(value: Any) -> bool:
-    return not (isinstance(value, tuple | list | dict) and not value)
+    shown = {name: (type(value), repr(value)) for name, value in defaults.items()}
+    return {name: value for name, value in options.items() if (type(value), repr(value)) != shown.get(name)}
 
 
 def _shown(value: Any) -> str:
     text = repr(str(value)) if hasattr(value, "__fspath__") else repr(value)
-    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+    return text if len(text) <= LONGEST_ARGUMENT else f"{text[:LONGEST_ARGUMENT]}..."
 
 
 def require_from(name: str, value: int, low: int, high: int) -> None:
@@ -87,7 +81,9 @@ def split(filter: Any, sensors: Sequence[Any], vehicle: Any, controller: Any) ->
 def own_filter(filter: Any) -> Any:
     """The filter of a replay that is not ours; None where ours is meant."""
     if isinstance(filter, str) and filter == "paper":
-        raise InputError("--filter paper: the paper's filter flies in simulation only, where it is fed as it was")
+        raise InputError(
+            f"{arg('filter')} paper: the paper's filter flies in simulation only, where it is fed as it was"
+        )
     return None if filter is None or (isinstance(filter, str) and filter == "landing") else _part("filter", filter)
 
 

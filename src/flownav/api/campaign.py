@@ -10,7 +10,7 @@ import numpy as np
 
 from flownav.api.calls import writing
 from flownav.api.record import Record
-from flownav.api.table import FRAMES
+from flownav.api.table import library
 from flownav.campaigns.engines import Engine
 from flownav.campaigns.measures import measured
 from flownav.campaigns.plan import Plan
@@ -93,13 +93,9 @@ class Campaign:
             >>> len(flownav.campaign("landing", flights=16).to_pandas())
             16
         """
-        try:
-            import pandas
-        except ImportError:
-            raise InputError(f"pandas is not installed; {FRAMES} installs it") from None
-        data = Dataset(self.folder)
+        frames_of, data = library("pandas"), Dataset(self.folder)
         frames = [data.table(cell).to_pandas() for cell in range(len(self.plan.cells))]
-        found: pandas.DataFrame = pandas.concat(frames, ignore_index=True)
+        found: pandas.DataFrame = frames_of.concat(frames, ignore_index=True)
         return found
 
     def record(self, flight: int, *, cell: int = 0) -> Record:

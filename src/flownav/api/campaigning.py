@@ -22,8 +22,8 @@ from flownav.campaigns.rare.branches import read_branch, replayed, write_branch
 from flownav.campaigns.rare.estimate import Rare, estimate_rare
 from flownav.campaigns.run import Progress, Watch, engine_named, record_path, run_campaign
 from flownav.campaigns.store import RECORDS, SUMMARY, Store
-from flownav.campaigns.summary import WORST, summary_of
-from flownav.core.errors import InputError
+from flownav.campaigns.summary import WORST_FLIGHTS, summary_of
+from flownav.core.errors import InputError, arg
 from flownav.core.files import written_whole
 from flownav.core.provenance import called_as
 from flownav.parts.flying import OwnPartsEngine, identities
@@ -86,7 +86,7 @@ def campaign(
         flights=most if flights is None else flights,
         seed=seed, sweep=sweep or {}, changes=fixed, sampling=sampling, truth_model=truth_model, until=until,
     )  # fmt: skip
-    require_from("records", records, 0, WORST)
+    require_from("records", records, 0, WORST_FLIGHTS)
     if parts.any and engine != "local":
         raise InputError(f"engine {engine}: parts of your own are flown by this process; leave it out")
     plan = replace(plan, parts=identities(parts))
@@ -218,12 +218,14 @@ class RareEvent:
 
 def rare_event_of(plan: Plan, text: str) -> Event:
     """The event in these words. InputError where it is none, or this plan cannot be asked for it."""
-    require_one(plan, "--rare")
+    require_one(plan, "rare")
     if plan.sampling != "plain" or plan.until is not None:
-        raise InputError("--rare: has samples and a stop of its own; leave out --sampling and --until")
+        raise InputError(
+            f"{arg('rare')}: has samples and a stop of its own; leave out {arg('sampling')} and {arg('until')}"
+        )
     chosen = event_of(text)
     if MEASURES[chosen.measure].of_landing and not lands(plan.cells[0].scenario):
-        raise InputError(f"--rare {chosen}: the scenario {plan.cells[0].scenario.name} never lands")
+        raise InputError(f"{arg('rare')} {chosen}: the scenario {plan.cells[0].scenario.name} never lands")
     return chosen
 
 
@@ -248,16 +250,19 @@ def estimate_event(plan: Plan, event: Event, folder: Path, progress: Callable[[i
 
 def fly_branch(plan: Plan, path: Path) -> tuple[Record, dict[str, str]]:
     """The flight of such a file, flown again; its record and its report lie beside it. InputError where it is none."""
-    require_one(plan, "--flight")
+    require_one(plan, "flight")
     setup = plan.cells[0].setup
     record = Record.of(replayed(setup, read_branch(path, setup)))
     return record, _written(record, path.with_suffix(".fnr"))
 
 
-def require_one(plan: Plan, option: str) -> None:
+def require_one(plan: Plan, name: str) -> None:
     """InputError where there is more than one cell."""
     if len(plan.cells) != 1:
-        raise InputError(f"{option}: needs one scenario, one --truth-model and no --sweep, not {len(plan.cells)} cells")
+        raise InputError(
+            f"{arg(name)}: needs one scenario, one {arg('truth_model')} and no {arg('sweep')}, "
+            f"not {len(plan.cells)} cells"
+        )
 
 
 def _keep_branch(plan: Plan, found: Rare, folder: Path) -> dict[str, str]:

@@ -13,7 +13,7 @@ from flownav.api.scenario import Scenario, scenario_of
 from flownav.api.vehicle import Vehicle
 from flownav.campaigns.judged import BOUND_FLIGHTS, Judged, bound_of, consistency_facts, fly_judged
 from flownav.campaigns.local import fly_recorded, known_exactly, median_flight, score_history
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.provenance import called_as
 from flownav.parts.flying import fly_parts, fly_with, names_of
 from flownav.parts.protocols import Controller, Filter, Parts, SensorModel, VehicleModel
@@ -204,7 +204,9 @@ def tell(setup: Setup, record: Record, url: str, speed: float, key: Path | None)
     from flownav.logs.mavlink.signing import load_key
 
     if "imu" not in record.tables or "gps_velocity" not in record.tables:
-        raise InputError("--mavlink: the flight has no IMU or no GPS velocity; give --filter landing --gps midg")
+        raise InputError(
+            f"{arg('url')}: the flight has no IMU or no GPS velocity; give {arg('filter')} landing {arg('gps')} midg"
+        )
     vehicle = SimulatedVehicle(log_of(record, setup), key=load_key(key) if key else None)
     link = open_link(url)
     try:

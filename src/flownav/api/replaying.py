@@ -16,8 +16,8 @@ from flownav.logs.open_log import open_flight
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import settings_of
 from flownav.parts.calling import name_of
+from flownav.parts.flying import replay_with
 from flownav.parts.protocols import Filter
-from flownav.parts.replaying import replay_with
 from flownav.replays.bundle import to_record
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
@@ -80,7 +80,7 @@ def replay(
     call = call_of("replay", log, **changed(replay, options))
     outages = tuple(_window(window) for window in gps_outages)
     table = table_windows(*outage_table, option="outage_table") if outage_table else []
-    datasheet = None if sensor is None else _sheet_of(sensor)
+    datasheet = sensor.file if isinstance(sensor, Sensor) else None if sensor is None else load_sensor(sensor)
     stated = _stated(settings)
     scale = (float(flow_scale[0]), float(flow_scale[1]))
     asked = ReplayOptions(gps_delay_s, outages, flow, scale)
@@ -132,10 +132,6 @@ def _window(window: Sequence[float]) -> tuple[float, float]:
         return float(t0), float(t1)
     except (TypeError, ValueError):
         raise InputError(f"gps_outages: {window!r}: a window (t0, t1) in seconds is needed") from None
-
-
-def _sheet_of(sensor: str | Path | Sensor) -> FlowSensor:
-    return sensor.file if isinstance(sensor, Sensor) else load_sensor(sensor)
 
 
 def _stated(settings: Settings) -> NavigatorSettingsFile | None:

@@ -22,8 +22,8 @@ from flownav.scoring.recorded import at_instants, scores_of_other
 
 KNOWN = ("t_s", *TABLES["estimate"], *VELOCITY_NED)
 NEEDED = ("t_s", *POSITION_NED)
-TOGETHER = (VELOCITY_BODY, QUATERNION, VELOCITY_NED, PROTECTION_LEVELS)  # columns that say nothing one by one
-LONGEST = 100.0  # times the flight: such an estimate counts other seconds
+COLUMN_GROUPS = (VELOCITY_BODY, QUATERNION, VELOCITY_NED, PROTECTION_LEVELS)  # columns that say nothing one by one
+MOST_FLIGHT_LENGTHS = 100.0  # times the flight: such an estimate counts other seconds
 UNIT_LENGTH = (0.9, 1.1)  # of a quaternion
 
 
@@ -38,7 +38,7 @@ def columns_of_estimate(given: Any, span_s: tuple[float, float]) -> dict[str, Ar
     _require_names(columns)
     kept = {name: values for name, values in columns.items() if name in KNOWN}
     _require_shapes(kept)
-    for names in TOGETHER:
+    for names in COLUMN_GROUPS:
         there = [name for name in names if name in kept]
         if there and len(there) < len(names):
             raise InputError(f"estimate: it has {there[0]}, and {_missing(names, kept)} is missing; give all or none")
@@ -106,7 +106,7 @@ def _require_time(t_s: Array, span_s: tuple[float, float]) -> None:
     first, last = span_s
     if not np.isfinite(t_s).all() or not (np.diff(t_s) > 0.0).all():
         raise InputError("estimate: t_s must be finite and increase from row to row; sort it, and drop what is twice")
-    if t_s[-1] - t_s[0] > LONGEST * (last - first):
+    if t_s[-1] - t_s[0] > MOST_FLIGHT_LENGTHS * (last - first):
         raise InputError(
             f"estimate: t_s goes from {t_s[0]:g} to {t_s[-1]:g}, and the record lasts {last - first:g} s; give seconds"
         )
@@ -132,7 +132,7 @@ def _missing(names: tuple[str, ...], columns: Mapping[str, Array]) -> str:
 # tables that our filter wrote, or that lie in the frame of its estimate
 OURS = ("states", "innovation", "consistency", "smoothed", "flown", "fed", "autopilot", "estimate")
 KINDS = ("fly", "replay")
-WHOLE = 0.99  # of the instants that are scored: an estimate that covers less is said to
+WHOLE_SHARE = 0.99  # of the instants that are scored: an estimate that covers less is said to
 
 
 def rescored(record: Record, estimate: object, name: str, *, from_handover: bool) -> Record:
@@ -148,7 +148,7 @@ def rescored(record: Record, estimate: object, name: str, *, from_handover: bool
     if "reference" in tables:
         tables["truth"] = _placed(columns, tables["reference"])
     covered = _covered(record, columns)
-    thin = f"the estimate covers {100.0 * covered:.0f} % of what is scored" if covered < WHOLE else ""
+    thin = f"the estimate covers {100.0 * covered:.0f} % of what is scored" if covered < WHOLE_SHARE else ""
     findings = [{"text": thin, "bad": True}] if thin else []
     facts = {"filter": name, "findings": findings, "notes": [], "covered_fraction": covered}
     other = Record(manifest | facts, {"estimate": columns, **tables})

@@ -13,7 +13,7 @@ from flownav.sensors.datasheet import DEFAULT_SENSOR, FlowSensor
 if TYPE_CHECKING:
     from flownav.lab.identification.findings import Findings
 
-PAPER = "px4flow-paper"
+PAPER, NAN = "px4flow-paper", float("nan")
 
 
 class Valued(NamedTuple):
@@ -73,9 +73,8 @@ class Sensor:
             True
         """
         found = self.file.identification
-        if found is None:
-            return Valued(self.file.dynamics.gain, float("nan"), float("nan"))
-        return Valued(float(found.gain), float(found.gain_low), float(found.gain_high))
+        own = (self.file.dynamics.gain, NAN, NAN) if found is None else (found.gain, found.gain_low, found.gain_high)
+        return Valued(*map(float, own))
 
     @property
     def latency_s(self) -> Valued:
@@ -85,10 +84,9 @@ class Sensor:
             >>> 0.0 < flownav.Sensor.load().latency_s.value < 0.5
             True
         """
-        found = self.file.identification
-        if found is None:
-            return Valued(self.file.dynamics.delay_s, float("nan"), float("nan"))
-        return Valued(float(found.latency_s), float(found.latency_low_s), float(found.latency_high_s))
+        found, delay_s = self.file.identification, self.file.dynamics.delay_s
+        own = (delay_s, NAN, NAN) if found is None else (found.latency_s, found.latency_low_s, found.latency_high_s)
+        return Valued(*map(float, own))
 
     @property
     def facts(self) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
+from flownav.core.errors import InputError
 from flownav.core.record import Column
 
 if TYPE_CHECKING:
@@ -78,8 +79,8 @@ class Table(dict[str, Column]):
             >>> frame.index.name
             't_s'
         """
-        library = _library("pandas")
-        found: pandas.DataFrame = library.DataFrame(dict(self)).set_index("t_s")
+        made = library("pandas")
+        found: pandas.DataFrame = made.DataFrame(dict(self)).set_index("t_s")
         return found
 
     def to_xarray(self) -> xarray.Dataset:
@@ -92,14 +93,14 @@ class Table(dict[str, Column]):
             >>> estimate.pos_n_m.attrs["units"]
             'm'
         """
-        library, units = _library("xarray"), self.units()
+        made, units = library("xarray"), self.units()
         columns = {
             column: ("t_s", values, {"units": units[column]} if units[column] else {})
             for column, values in self.items()
             if column != "t_s"
         }
         time = ("t_s", self["t_s"], {"units": "s"})
-        found: xarray.Dataset = library.Dataset(columns, {"t_s": time}, {"title": self.name})
+        found: xarray.Dataset = made.Dataset(columns, {"t_s": time}, {"title": self.name})
         return found
 
     def to_polars(self) -> polars.DataFrame:
@@ -109,16 +110,14 @@ class Table(dict[str, Column]):
             >>> flownav.fly("landing", flight={"duration_s": 6.0}).estimate.to_polars().columns[0]
             't_s'
         """
-        library = _library("polars")
-        found: polars.DataFrame = library.DataFrame({"t_s": self["t_s"], **self})
+        made = library("polars")
+        found: polars.DataFrame = made.DataFrame({"t_s": self["t_s"], **self})
         return found
 
 
-def _library(name: str) -> Any:
+def library(name: str) -> Any:
     """A data-frame library. InputError where it is not installed."""
     from importlib import import_module
-
-    from flownav.core.errors import InputError
 
     try:
         return import_module(name)

@@ -6,27 +6,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.campaigns.ablations import ablations
-from flownav.campaigns.judged import BOUND_FLIGHTS, Judged, bound_of, fly_judged
+from flownav.campaigns.judged import BOUND_FLIGHTS, Judged, ablations, bound_of, fly_judged
 from flownav.campaigns.local import known_exactly
 from flownav.campaigns.measures import CRASH, measured
 from flownav.campaigns.requirement import SHIPPED, Requirement, load_requirement
 from flownav.campaigns.requirement import scenario_of as scenario_required
 from flownav.core.text import finite_or_none
-from flownav.scoring.consistency import (
-    BAND,
-    GROUP_FLIGHTS,
-    ErrorSums,
-    anees,
-    efficiency,
-    efficiency_by_height,
-    inside_fraction,
-    inside_steps,
-    over_stated,
-)
+from flownav.scoring import consistency
 from flownav.scoring.errors import MAX_POSITION_ERROR, touchdown_rows
-from flownav.scoring.landings import REST_DISTANCE, crashed, radius, touchdown_of_flights
-from flownav.scoring.percentiles import percentile_with_interval
+from flownav.scoring.landings import REST_DISTANCE, crashed, percentile_with_interval, radius, touchdown_of_flights
 from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.plan import Flight
@@ -114,7 +102,8 @@ def scenario_of(name: str, vehicle: str | None = None) -> Scenario:
 
 def inside(flights: int) -> str:
     """What the ANEES of so many flights is held against: that of each GROUP_FLIGHTS, of all where there are fewer."""
-    return f"steps with the ANEES of {min(flights, GROUP_FLIGHTS)} flights in its {100 * BAND:.0f} % band"
+    group = min(flights, consistency.GROUP_FLIGHTS)
+    return f"steps with the ANEES of {group} flights in its {100 * consistency.BAND_PROBABILITY:.0f} % band"
 
 
 def run_case(
@@ -149,7 +138,7 @@ def run_case(
     return Case(name, setup.described.name, known_exactly(scenario), flights, matched, ensemble, targets, taken_apart)
 
 
-def _facts(judged: Judged, bound: ErrorSums) -> dict[str, Any]:
+def _facts(judged: Judged, bound: consistency.ErrorSums) -> dict[str, Any]:
     """Accuracy and consistency of a batch; null for a figure without a finite value. bound: the matched flights'."""
     assert judged.sums is not None
     assert judged.groups is not None
@@ -164,12 +153,12 @@ def _facts(judged: Judged, bound: ErrorSums) -> dict[str, Any]:
         "p95_largest_horizontal_interval_m": [finite_or_none(x) for x in horizontal[1:]],
         "rms_error": [finite_or_none(x) for x in judged.flown.root_mean_square()],
         "rms_error_at_horizon": [finite_or_none(x) for x in judged.sums.errors.root_mean_square()],
-        "anees": anees(judged.sums),
-        "anees_inside_fraction": inside_fraction(judged.groups),
-        "anees_inside_fraction_of_all_flights": inside_fraction([inside_steps(judged.sums)]),
-        "error_over_stated": over_stated(judged.sums),
-        "rmse_over_bound": efficiency(judged.sums.errors, bound),
-        "rmse_over_bound_by_height": efficiency_by_height(judged.sums.errors, bound),
+        "anees": consistency.anees(judged.sums),
+        "anees_inside_fraction": consistency.inside_fraction(judged.groups),
+        "anees_inside_fraction_of_all_flights": consistency.inside_fraction([consistency.inside_steps(judged.sums)]),
+        "error_over_stated": consistency.over_stated(judged.sums),
+        "rmse_over_bound": consistency.efficiency(judged.sums.errors, bound),
+        "rmse_over_bound_by_height": consistency.efficiency_by_height(judged.sums.errors, bound),
     }
 
 
@@ -225,7 +214,7 @@ def _cost(judged: Judged, whole: Judged) -> dict[str, Any]:
         "horizontal_rms_ratio": ratio(slice(0, 2)),
         "vertical_rms_ratio": ratio(slice(2, 3)),
         "horizontal_speed_rms_ratio": ratio(slice(3, 5)),
-        "anees": anees(judged.sums),
+        "anees": consistency.anees(judged.sums),
         "rest_r95_m": radius(landings, REST_DISTANCE)["r95_m"],
         "crashed": int(crashed(landings).sum()),
     }

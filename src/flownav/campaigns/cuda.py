@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from flownav.campaigns.device_flight import TAPE_COUNTS, fly_navigated_flight, fly_paper_flight, take_here
-from flownav.campaigns.engines import Part, neighbours
+from flownav.campaigns.engines import Part, into_parts, neighbours
 from flownav.campaigns.local import home_epoch
 from flownav.campaigns.plan import Ready, ready_of
 from flownav.core.compile import ONE_LANE, WARP, NoDeviceError, Runner, announce_compilation, device_runner
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 from flownav.estimation.covariance import with_lag
 from flownav.navigation.memory import new_work
@@ -36,7 +36,7 @@ from flownav.simulation.truth import TRUTH_ROWS, SensorFault, packed_truth
 
 Truths = Callable[[int, int], Array]  # of so many flights from a number on: (TRUTH_ROWS, flights); of one, for all
 
-SLICE = 512  # flights that a process draws at a time
+SLICE_FLIGHTS = 512  # flights that a process draws at a time
 WORTH_IT = 4096  # flights: fewer are drawn before other processes have started
 
 
@@ -67,7 +67,7 @@ def truths_of_cell(cell: Ready, seed: int, flights: int, processes: int) -> Iter
     pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _begin, (told, seed))
 
     def packed(first: int, count: int) -> Array:
-        ends = [*range(first, first + count, SLICE), first + count]
+        ends = [*range(first, first + count, SLICE_FLIGHTS), first + count]
         return np.concatenate(list(pool.map(_draw, ends[:-1], np.diff(ends).tolist())), axis=1)
 
     try:
@@ -111,21 +111,17 @@ class Cuda:
         asked = sum(part.flights for part in parts)
         with truths_of_cell(cell, seed, asked, self._processes) as truths:
             for together in neighbours(parts):
-                waiting, held = list(together), np.empty((0, RUNNING_COLUMNS))
                 total = sum(part.flights for part in together)
-                for rows in self.rows(cell.flight, seed, together[0].first, total, truths):
-                    on_progress(len(rows))
-                    held = np.concatenate([held, rows])
-                    while waiting and len(held) >= waiting[0].flights:
-                        part = waiting.pop(0)
-                        yield part, held[: part.flights]
-                        held = held[part.flights :]
+                rows = self.rows(cell.flight, seed, together[0].first, total, truths)
+                yield from into_parts(together, rows, on_progress)
 
     def rows(self, flight: Flight, seed: int, first: int, flights: int, truths: Truths) -> Iterator[Array]:
         """The rows of so many flights from number `first` on, (flights, RUNNING_COLUMNS), as many as fit at a time."""
         at_once = min(self._at_once, flights, most_that_fit(self._runner.free_bytes(), flight))
         if at_once < 1:
-            raise InputError("--engine cuda: the device has no memory left for a flight; use --engine local")
+            raise InputError(
+                f"{arg('engine')} cuda: the device has no memory left for a flight; use {arg('engine')} local"
+            )
         room = Room(self._runner, flight, at_once)
         starts = range(first, first + flights, at_once)
         counts = [min(at_once, first + flights - start) for start in starts]
@@ -198,4 +194,4 @@ def _runner() -> Runner:
     try:
         return device_runner(take_here)
     except NoDeviceError as error:
-        raise InputError(f"--engine cuda: {error}; use --engine local") from error
+        raise InputError(f"{arg('engine')} cuda: {error}; use {arg('engine')} local") from error

@@ -8,7 +8,7 @@ import logging
 import os
 import secrets
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple, Protocol
 
@@ -17,7 +17,7 @@ import numpy as np
 from flownav.campaigns.local import rows_of
 from flownav.campaigns.plan import Ready, ready_of
 from flownav.core.compile import LANES
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 from flownav.simulation.engine import Instead, fly_blocks
 from flownav.simulation.plan import Flight
@@ -63,29 +63,35 @@ class Local:
     def _without_pause(
         self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object]
     ) -> Iterator[tuple[Part, Array]]:
-        flight, waiting = cell.flight, list(parts)
-        held: list[Array] = []
-        total = sum(part.flights for part in parts)
+        flight, total = cell.flight, sum(part.flights for part in parts)
 
         def judge(history: Array) -> Array:
             self.check(flight, history)
             return rows_of(flight, history)
 
-        have = 0
         first, fault = parts[0].first, cell.faults(seed)
 
         def instead(start: int) -> Instead:
             numbers = range(first + start, first + start + len(LANES))
             return Instead(faults=fault and [fault(number) for number in numbers], take=self.instead)
 
-        for flown, block in fly_blocks(flight, seed, first, total, judge, self.threads, cell.ensemble, instead):
-            held.append(block)
-            have += flown
-            on_progress(flown)
-            while waiting and have >= waiting[0].flights:
-                part, rows = waiting.pop(0), np.concatenate(held)
-                held, have = [rows[part.flights :]], have - part.flights
-                yield part, rows[: part.flights]
+        blocks = fly_blocks(flight, seed, first, total, judge, self.threads, cell.ensemble, instead)
+        yield from into_parts(parts, (block for _, block in blocks), on_progress)
+
+
+def into_parts(
+    parts: Sequence[Part], blocks: Iterable[Array], on_progress: Callable[[int], object]
+) -> Iterator[tuple[Part, Array]]:
+    """The rows of each part, from blocks of rows in order, told as they come."""
+    waiting, held, have = list(parts), list[Array](), 0
+    for block in blocks:
+        held.append(block)
+        have += len(block)
+        on_progress(len(block))
+        while waiting and have >= waiting[0].flights:
+            part, rows = waiting.pop(0), np.concatenate(held)
+            held, have = [rows[part.flights :]], have - part.flights
+            yield part, rows[: part.flights]
 
 
 def neighbours(parts: Sequence[Part]) -> Iterator[list[Part]]:
@@ -102,7 +108,7 @@ def neighbours(parts: Sequence[Part]) -> Iterator[list[Part]]:
 
 
 # -- a cluster ---------------------------------------------------------------------------------------------------
-AHEAD = 2  # parts that wait for each core of the cluster
+PARTS_AHEAD = 2  # parts that wait for each core of the cluster
 
 
 class RayCluster:
@@ -113,7 +119,7 @@ class RayCluster:
         try:
             import ray
         except ImportError:
-            raise InputError('--engine ray: Ray is not installed; pip install "flownav[cluster]"') from None
+            raise InputError(f'{arg("engine")} ray: Ray is not installed; pip install "flownav[cluster]"') from None
         self._ray = ray
         if not ray.is_initialized():
             where = address or os.environ.get("RAY_ADDRESS")
@@ -125,7 +131,7 @@ class RayCluster:
                     logging_level=logging.ERROR,
                 )
             except (ConnectionError, RuntimeError, ValueError) as error:
-                raise InputError(f"--engine ray: no cluster at {where}: {str(error).splitlines()[0]}") from None
+                raise InputError(f"{arg('engine')} ray: no cluster at {where}: {str(error).splitlines()[0]}") from None
 
     def close(self) -> None:
         """Leave the cluster; one of this machine alone ends."""
@@ -138,7 +144,7 @@ class RayCluster:
         told = self._ray.put((cell.setup, cell.truth_model, cell.sampling, cell.flights, cell.failure))
         key = secrets.token_hex(8)
         task = self._ray.remote(num_cpus=1, max_retries=-1)(fly_part)
-        most = AHEAD * max(1, int(self._ray.cluster_resources().get("CPU", 1)))
+        most = PARTS_AHEAD * max(1, int(self._ray.cluster_resources().get("CPU", 1)))
         waiting: deque[tuple[Part, Any]] = deque()
         for part in parts:
             waiting.append((part, task.remote([told], key, seed, part)))

@@ -9,15 +9,8 @@ import numpy as np
 from flownav.core.measurement import Array
 from flownav.core.parameter_files import check
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
+from flownav.scoring import errors
 from flownav.scoring.consistency import largest_horizontal_error
-from flownav.scoring.errors import (
-    MAX_POSITION_ERROR,
-    SCORE_COLUMNS,
-    published,
-    score_block,
-    scores_of_flight,
-    touchdown_rows,
-)
 from flownav.scoring.landings import (
     CONTACT_DISTANCE,
     REST_DISTANCE,
@@ -43,7 +36,7 @@ def score_history(flight: Flight, history: Array) -> Array:
     """The scores of a block's flights, (lanes, len(SCORE_COLUMNS)); history (epochs, len(HISTORY), lanes)."""
     estimate = history[:, columns("estimate", (*POSITION_NED, *VELOCITY_BODY))]
     truth = history[:, columns("truth", (*POSITION_NED, *VELOCITY_BODY))]
-    return score_block(estimate, truth, touchdown_history(flight, history), counted_steps(flight, history))
+    return errors.score_block(estimate, truth, touchdown_history(flight, history), counted_steps(flight, history))
 
 
 def touchdown_history(flight: Flight, history: Array) -> Array:
@@ -126,7 +119,7 @@ def fly_many(
     on_progress: Callable[[int], None] = lambda flown: None,
 ) -> Array:
     """The scores of flights `first` to `first + flights - 1`, (flights, len(SCORE_COLUMNS)); matched or drawn."""
-    scores = np.empty((flights, len(SCORE_COLUMNS)))
+    scores = np.empty((flights, len(errors.SCORE_COLUMNS)))
     done = 0
 
     def judge(history: Array) -> Array:
@@ -170,11 +163,11 @@ def record_flown(setup: Setup, flown: Flown, seed: int, index: int, drawn: dict[
     if drawn is not None:
         record.manifest["parameters"] = {**record.manifest["parameters"], "drawn": drawn}
     up = takeoff_history(setup.flight, flown.history)
-    record.manifest["scores"] = scores_of_flight(score_history(setup.flight, flown.history)[0])
+    record.manifest["scores"] = errors.scores_of_flight(score_history(setup.flight, flown.history)[0])
     record.manifest["scores"]["takeoff"] = None if up is None else takeoff_of_flight(up[0])
     record.add("judging", judging_table(setup.flight, flown.history))
     record.manifest["judging"] = judging_facts(setup.flight)
-    record.manifest["paper"] = published(setup.scenario.paper_table)
+    record.manifest["paper"] = errors.published(setup.scenario.paper_table)
     if setup.fitted is not None:
         record.manifest["known_exactly"] = known_exactly(setup.scenario)
     return record
@@ -209,7 +202,7 @@ def judging_facts(flight: Flight) -> dict[str, Any]:
 
 def median_flight(scores: Array) -> int:
     """The index of the flight whose largest position error is the (lower) median."""
-    order = np.argsort(scores[:, MAX_POSITION_ERROR], kind="stable")
+    order = np.argsort(scores[:, errors.MAX_POSITION_ERROR], kind="stable")
     return int(order[(len(order) - 1) // 2])
 
 
@@ -257,7 +250,7 @@ def fly_envelope(
             setup = in_wind(scenario, speed, direction)
             ensemble = setup.ensemble() if dispersed else None
             scores = fly_many(setup.flight, seed, flights, ensemble=ensemble, on_progress=on_progress)
-            landings = touchdown_rows(scores)
+            landings = errors.touchdown_rows(scores)
             rows.append(
                 {
                     "speed_20ft_m_s": speed,

@@ -14,12 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 from flownav.core.text import finite_or_none
 from flownav.scoring.errors import SCORE_COLUMNS, touchdown_rows
-from flownav.scoring.landings import EXPECTED, crashed, succeeded
-from flownav.scoring.percentiles import percentile_with_interval, share_with_interval
+from flownav.scoring.landings import EXPECTED, crashed, percentile_with_interval, share_with_interval, succeeded
 
 CRASH, NOT_LANDED = "crash", "not_landed"
 LARGEST_HORIZONTAL = "largest_horizontal_m"
@@ -134,7 +133,7 @@ def happened(event: Event, rows: Array) -> NDArray[np.bool_]:
 # -- figures of many flights -------------------------------------------------------------------------------------
 CONFIDENCE = 0.95
 FIRST_LOOK, GROWTH = 512, 1.5  # flights at the first look, and how many times as many at each further one
-TOGETHER = 256  # flights are looked at in whole files
+FLIGHTS_TOGETHER = 256  # flights are looked at in whole files
 STOP = re.compile(r"\s*(\w+)\s+width\s*<=?\s*(\S+)\s*")
 
 
@@ -204,9 +203,9 @@ def stop_of(text: str) -> Stop:
     except ValueError:
         width = np.nan
     if not found or not width > 0.0 or not np.isfinite(width):
-        raise InputError(f'--until {text!r}: a figure and a width are needed, such as "r95_m width <= 0.005"')
+        raise InputError(f'{arg("until")} {text!r}: a figure and a width are needed, such as "r95_m width <= 0.005"')
     if found[1] not in FIGURES:
-        raise InputError(f"--until {text!r}: no such figure; known: {', '.join(FIGURES)}")
+        raise InputError(f"{arg('until')} {text!r}: no such figure; known: {', '.join(FIGURES)}")
     return Stop(found[1], width)
 
 
@@ -214,7 +213,7 @@ def looks(most: int) -> list[int]:
     """After how many flights a stop is looked at, at most `most`; the last is `most`."""
     found, flights = [], float(FIRST_LOOK)
     while flights < most:
-        found.append(int(flights) // TOGETHER * TOGETHER)
+        found.append(int(flights) // FLIGHTS_TOGETHER * FLIGHTS_TOGETHER)
         flights *= GROWTH
     return [*found, most]
 

@@ -104,7 +104,7 @@ def eye_of(setup: Setup, seed: int, index: int, ensemble: Ensemble | None) -> Ey
     if sheet is None:
         raise InputError(f"{setup.scenario.name}: optics = pixels needs a pad camera: [pad_fix], and the navigator")
     if not sheet.camera or sheet.side_m == 0.0:
-        raise InputError(f"{sheet.name}: names no camera to render; measure one with flownav pad --out")
+        raise InputError(f"{sheet.name}: names no camera to render; measure one with `flownav pad --out`")
     trial, target = pad_trial.camera_named(sheet.camera), target_of(sheet)
     flown = pad_trial.camera_flight(trial, target, seed, index)
     rng = np.random.default_rng([seed, index, 31])

@@ -1,7 +1,7 @@
 """What a campaign flies: cells, each a scenario with its values of what is swept, and how their flights are drawn.
 
 A design gives the uniforms of an input, a number in (0, 1) for each flight, as a function of (seed, flight, name) and
-of how many flights the campaign has. Hypercubes and sequences are of `TOGETHER` flights each, one after the other and
+of how many flights the campaign has. Hypercubes and sequences are of `LOT_FLIGHTS` flights each, one after the other,
 independent of each other: a flight's inputs can be had without those of a million others.
 """
 
@@ -16,7 +16,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from flownav.campaigns.measures import FIGURES, MEASURES, stop_of
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 from flownav.core.parameter_files import check
 from flownav.core.provenance import code_sha256
@@ -28,8 +28,8 @@ from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.truth import SensorFault
 
-TOGETHER = 1024  # flights of one hypercube, or of one scrambled sequence
-INSIDE = 2.0**-53  # of (0, 1): a point may lie on the edge, where a distribution may be infinite
+LOT_FLIGHTS = 1024  # flights of one hypercube, or of one scrambled sequence
+EDGE_MARGIN = 2.0**-53  # of (0, 1): a point may lie on the edge, where a distribution may be infinite
 SAMPLINGS = ("plain", "latin", "sobol")
 Sampling = Literal["plain", "latin", "sobol"]
 
@@ -46,16 +46,16 @@ class Spread:
         """The numbers of these flights."""
         found = uniforms(seed, flights, name)
         index, column = np.asarray(flights), self.column[name]
-        for lot in np.unique(index[index < self.flights] // TOGETHER):
-            own = (index // TOGETHER == lot) & (index < self.flights)
-            found[own] = self._points(seed, int(lot))[index[own] - lot * TOGETHER, column]
+        for lot in np.unique(index[index < self.flights] // LOT_FLIGHTS):
+            own = (index // LOT_FLIGHTS == lot) & (index < self.flights)
+            found[own] = self._points(seed, int(lot))[index[own] - lot * LOT_FLIGHTS, column]
         return found
 
     def _drawn(self, seed: int, lot: int) -> Array:
         """The points of one lot, (flights in it, inputs)."""
         from scipy.stats import qmc
 
-        count = min(TOGETHER, self.flights - lot * TOGETHER)
+        count = min(LOT_FLIGHTS, self.flights - lot * LOT_FLIGHTS)
         rng = np.random.default_rng([seed, lot])
         engine: Any
         if self.kind == "latin":
@@ -63,8 +63,8 @@ class Spread:
             points = engine.random(count)
         else:
             engine = qmc.Sobol(len(self.column), scramble=True, rng=rng)
-            points = engine.random_base2(TOGETHER.bit_length() - 1)[:count]
-        return np.asarray(np.clip(points, INSIDE, 1.0 - INSIDE))
+            points = engine.random_base2(LOT_FLIGHTS.bit_length() - 1)[:count]
+        return np.asarray(np.clip(points, EDGE_MARGIN, 1.0 - EDGE_MARGIN))
 
 
 def design_of(sampling: Sampling, names: Sequence[str], flights: int) -> Design | None:
@@ -215,13 +215,13 @@ def planned(
     """Every scenario with these changes at every combination of the swept values. InputError for one that cannot be."""
     fixed, names = dict(changes or {}), tuple(sweeps)
     if both := sorted(set(fixed) & set(names)):
-        raise InputError(f"--sweep {both[0]}: is set as well; leave one of the two out")
+        raise InputError(f"{arg('sweep')} {both[0]}: is set as well; leave one of the two out")
     if len({scenario.name for scenario in scenarios}) < len(scenarios):
         raise InputError(f"{scenarios[0].name}: two scenarios have the same name, and the same flights; leave one out")
     combinations = [dict(zip(names, each, strict=True)) for each in itertools.product(*sweeps.values())]
     count = len(scenarios) * len(combinations) * len(truth_models)
     if count > MOST_CELLS:
-        raise InputError(f"--sweep: {count} combinations; at most {MOST_CELLS} are flown in one campaign")
+        raise InputError(f"{arg('sweep')}: {count} combinations; at most {MOST_CELLS} are flown in one campaign")
     cells = tuple(
         Cell(changed(scenario, fixed | values), values, truth_model, (*fixed, *names))
         for scenario in scenarios
@@ -237,7 +237,9 @@ def _require_figure(name: str, cells: Sequence[Cell]) -> None:
     """InputError where a cell has no such figure: it never lands."""
     never = next((cell for cell in cells if not lands(cell.scenario)), None)
     if never is not None and MEASURES[FIGURES[name].measure].of_landing:
-        raise InputError(f"--until {name}: the scenario {never.scenario.name} never lands; give p95_axis_m, or another")
+        raise InputError(
+            f"{arg('until')} {name}: the scenario {never.scenario.name} never lands; give p95_axis_m, or another"
+        )
 
 
 def lands(scenario: Scenario) -> bool:

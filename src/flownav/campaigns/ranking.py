@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.campaigns.plan import INSIDE
+from flownav.campaigns.plan import EDGE_MARGIN
 from flownav.core.measurement import Array
 from flownav.simulation.dispersion import Design, Distribution
 
@@ -28,7 +28,7 @@ CLASSES = ("build", "day", "never")
 CONFIDENCE = 0.90
 RESAMPLES = 1000
 MOST_KURTOSIS = 10.0  # beyond it the ranks are ranked: few outcomes far off carry the variance
-LEAST = 16  # rows: fewer say nothing
+LEAST_ROWS = 16  # rows: fewer say nothing
 Fly = Callable[[Design, int, int], Array]
 
 
@@ -74,8 +74,8 @@ def rank(entries: Mapping[str, Distribution], seed: int, n: int, fly: Fly) -> Ra
     entries: the dispersed inputs by name. n: rows, a power of 2. fly(design, first, n): the outcomes (n,) of flights
     `first` to `first + n - 1`, infinite where there was none. ValueError where n is none such.
     """
-    if n < LEAST or n & (n - 1):
-        raise ValueError(f"{n} rows: a power of 2 is needed, {LEAST} or more")
+    if n < LEAST_ROWS or n & (n - 1):
+        raise ValueError(f"{n} rows: a power of 2 is needed, {LEAST_ROWS} or more")
     names = tuple(entries)
     points, column = points_of(seed, n, len(names)), {name: k for k, name in enumerate(names)}
 
@@ -85,17 +85,15 @@ def rank(entries: Mapping[str, Distribution], seed: int, n: int, fly: Fly) -> Ra
 
     a, b = crossed(), crossed(*names, NOISE)
     inputs = (*names, NOISE)
-    groups = {known: [name for name in inputs if class_of(name, entries) == known] for known in CLASSES}
+    groups = {
+        known: [name for name in inputs if ("never" if name == NOISE else entries[name].known) == known]
+        for known in CLASSES
+    }
     found = [crossed(name) for name in inputs] + [crossed(*group) for group in groups.values()]
     (a, b, *swapped), of = bounded([a, b, *found])
     indices = indices_of(a, b, np.array(swapped), (*inputs, *groups), seed)
     ranked = sorted(indices[: len(inputs)], key=lambda index: -index.total)
     return Ranking(tuple(ranked), tuple(indices[len(inputs) :]), n, n * (2 + len(swapped)), of)
-
-
-def class_of(name: str, entries: Mapping[str, Distribution]) -> str:
-    """Who could know an input; nobody the noise."""
-    return "never" if name == NOISE else entries[name].known
 
 
 def flights_of(inputs: int, n: int) -> int:
@@ -110,7 +108,7 @@ def points_of(seed: int, n: int, inputs: int) -> Array:
     if not inputs:
         return np.empty((2, n, 0))
     engine: Any = qmc.Sobol(2 * inputs, scramble=True, rng=np.random.default_rng([seed, n]))
-    points = np.clip(engine.random_base2(n.bit_length() - 1), INSIDE, 1.0 - INSIDE)
+    points = np.clip(engine.random_base2(n.bit_length() - 1), EDGE_MARGIN, 1.0 - EDGE_MARGIN)
     return np.asarray(points.reshape(n, 2, inputs).transpose(1, 0, 2))
 
 

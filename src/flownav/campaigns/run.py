@@ -13,7 +13,7 @@ from flownav.campaigns.local import fly_recorded
 from flownav.campaigns.measures import Interval, enough, figure_of, looks, stop_of, values_of
 from flownav.campaigns.plan import Plan, Ready
 from flownav.campaigns.store import PART, Dataset, Store, table_of
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 from flownav.core.record import Record
 from flownav.simulation.assemble import Setup
@@ -168,7 +168,7 @@ def record_path(folder: Path, cell: int, flight: int) -> Path:
 def require_engine(name: str) -> None:
     """InputError where there is no engine of that name."""
     if name not in ENGINES:
-        raise InputError(f"--engine {name}: must be {', '.join(ENGINES[:-1])} or {ENGINES[-1]}")
+        raise InputError(f"{arg('engine')} {name}: must be {', '.join(ENGINES[:-1])} or {ENGINES[-1]}")
 
 
 def engine_named(name: str) -> Engine:

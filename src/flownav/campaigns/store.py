@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from flownav.campaigns.measures import ROW_COLUMNS, measured
 from flownav.campaigns.plan import Plan
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.files import written_whole
 from flownav.core.guard import an_output_folder
 from flownav.core.measurement import Array
@@ -61,7 +61,7 @@ class Store:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
                 raise InputError(
-                    f"{self.folder}: another process is flying this campaign; wait, or give another --out"
+                    f"{self.folder}: another process is flying this campaign; wait, or give another name"
                 ) from None
             self._sweep()
             if not (self.folder / PLAN).exists() or plan_in(self.folder) != json.loads(said):
@@ -77,18 +77,18 @@ class Store:
         there = {path.name for path in self.folder.iterdir()} - {LOCK}
         if not (self.folder / PLAN).is_file():
             if any(not name.endswith(".part") for name in there - {RECORDS}):
-                raise InputError(f"{self.folder}: is there and holds no campaign; give another --out")
+                raise InputError(f"{self.folder}: is there and holds no campaign; give another name")
             return
         known = plan_in(self.folder)
         for key, what in (("flownav", "version of flownav"), ("code_sha256", "code of flownav")):
             if known.get(key) != plan[key]:
-                raise InputError(f"{self.folder}: was flown by another {what}; give another --out, or move it away")
+                raise InputError(f"{self.folder}: was flown by another {what}; give another name, or move it away")
         asked = json.loads(json.dumps(plan))
         differs = [key for key in plan if known.get(key) != asked[key]]
         if differs and not _is_more_of(known, asked, differs):
             raise InputError(
-                f"{self.folder}: holds another campaign (other {', '.join(differs)}); give another --out, or move it "
-                "away (a plain campaign without --until may be given more flights, and goes on)"
+                f"{self.folder}: holds another campaign (other {', '.join(differs)}); give another name, or move it "
+                f"away (a plain campaign without {arg('until')} may be given more flights, and goes on)"
             )
 
     def _sweep(self) -> None:
@@ -178,9 +178,9 @@ def plan_in(folder: Path) -> dict[str, Any]:
     try:
         said = json.loads((folder / PLAN).read_bytes())
     except (OSError, ValueError) as error:
-        raise InputError(f"{folder / PLAN}: cannot be read ({error}); give another --out") from None
+        raise InputError(f"{folder / PLAN}: cannot be read ({error}); give another name") from None
     if not isinstance(said, dict):
-        raise InputError(f"{folder / PLAN}: is no campaign's; give another --out")
+        raise InputError(f"{folder / PLAN}: is no campaign's; give another name")
     return said
 
 

@@ -14,12 +14,11 @@ from flownav.campaigns.store import INPUT, Dataset
 from flownav.core.measurement import Array
 from flownav.core.text import finite_or_none
 from flownav.scoring.errors import SCORE_COLUMNS, touchdown_rows
-from flownav.scoring.landings import EXPECTED
-from flownav.scoring.percentiles import share_with_interval
+from flownav.scoring.landings import EXPECTED, share_with_interval
 
 VERDICTS = ("landed", "went_around", "crashed", "unfinished")
-SHARES = ("crash", "not_landed")  # measures that say yes or no: their share is a figure
-WORST = 10  # flights that are named
+YES_OR_NO = ("crash", "not_landed")  # measures that say yes or no: their share is a figure
+WORST_FLIGHTS = 10  # flights that are named
 
 
 class Flight(NamedTuple):
@@ -50,7 +49,7 @@ def summary_of(plan: Plan, data: Dataset) -> dict[str, Any]:
         "pooled_cells": alike,
         "scores": scores_of(rows),
         "verdicts": verdicts,
-        "worst": [flight._asdict() for flight in worst_first(every)[:WORST]],
+        "worst": [flight._asdict() for flight in worst_first(every)[:WORST_FLIGHTS]],
         "cells": cells,
     }
 
@@ -80,7 +79,7 @@ def cell_summary(plan: Plan, cell: int, data: Dataset) -> dict[str, Any]:
         "envelope": envelope(inputs, verdicts == "landed"),
         "sensitivity": sensitivity(inputs, values),
         "median": said[(len(said) - 1) // 2]._asdict(),
-        "worst": [flight._asdict() for flight in reversed(said[-WORST:])],
+        "worst": [flight._asdict() for flight in reversed(said[-WORST_FLIGHTS:])],
     }
 
 
@@ -115,7 +114,7 @@ def scores_of(rows: Array) -> dict[str, dict[str, Any]]:
     return {
         name: measures.spread_of(measures.measured(name, rows))
         for name, measure in measures.MEASURES.items()
-        if name not in SHARES and (lands or not measure.of_touchdown)
+        if name not in YES_OR_NO and (lands or not measure.of_touchdown)
     }
 
 
@@ -134,16 +133,16 @@ def inputs_of(data: Dataset, cell: int) -> dict[str, Array]:
 # -- views of a cell ---------------------------------------------------------------------------------------------
 SPEED, DIRECTION = "wind.speed_20ft_m_s", "wind.from_direction_deg"
 SECTORS, RINGS = 8, 4
-POINTS = 24  # of a convergence
+CONVERGENCE_POINTS = 24  # of a convergence
 LEAST = 8  # flights, before a figure is drawn
-SHOWN = 12  # inputs
+INPUTS_SHOWN = 12  # inputs
 
 
 def convergence(figure: str, values: Array) -> list[dict[str, float | None]]:
     """The figure and its interval after the first 8, ... flights, spaced evenly by their logarithm."""
     if len(values) < LEAST:
         return []
-    after = np.unique(np.geomspace(LEAST, len(values), POINTS).round().astype(int))
+    after = np.unique(np.geomspace(LEAST, len(values), CONVERGENCE_POINTS).round().astype(int))
     return [{"flights": int(count)} | measures.figure_of(figure, values[:count]).finite() for count in after]
 
 
@@ -196,4 +195,4 @@ def sensitivity(inputs: Mapping[str, Array], values: Array) -> list[dict[str, An
         middle = np.arctanh(np.clip(rho, -1.0 + 1e-12, 1.0 - 1e-12))
         low, high = (float(np.tanh(middle + side * reach)) for side in (-1.0, 1.0))
         found.append((abs(rho), {"input": name, "rank_correlation": rho, "low": low, "high": high}))
-    return [one for _, one in sorted(found, key=lambda each: -each[0])][:SHOWN]
+    return [one for _, one in sorted(found, key=lambda each: -each[0])][:INPUTS_SHOWN]

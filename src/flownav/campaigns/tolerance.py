@@ -17,12 +17,12 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from flownav.core.measurement import Array
-from flownav.scoring.percentiles import share_with_interval
+from flownav.scoring.landings import share_with_interval
 
 Verdict = Literal["pass", "fail", "not shown"]
 
 MOST_FLIGHTS = 10**9  # a plan that needs more is none
-POWER = 0.9  # the chance to pass that a plan for a second campaign should have
+PLAN_POWER = 0.9  # the chance to pass that a plan for a second campaign should have
 
 
 class Interval(NamedTuple):
@@ -120,7 +120,7 @@ def tolerance_bound(figures: Array, probability: float, confidence: float, *, up
 
 
 def flights_to_show(failure_rate: float, probability: float, confidence: float, most: int = 10_000) -> int | None:
-    """The fewest flights of a new plan that passes with a chance of POWER when flights fail at this rate.
+    """The fewest flights of a new plan that passes with a chance of PLAN_POWER when flights fail at this rate.
 
     None where the rate is not below what the requirement allows, or a plan would have to allow `most` failures.
     """
@@ -131,7 +131,7 @@ def flights_to_show(failure_rate: float, probability: float, confidence: float, 
     low, high = -1, 1  # plans for `low` failures do not do
 
     def serves(failures: int) -> bool:
-        return float(bdtr(float(failures), needed(probability, confidence, failures), failure_rate)) >= POWER
+        return float(bdtr(float(failures), needed(probability, confidence, failures), failure_rate)) >= PLAN_POWER
 
     if serves(0):
         return needed(probability, confidence, 0)

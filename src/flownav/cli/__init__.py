@@ -1,6 +1,7 @@
 """The command line: one module per command, each importing its job only when it is called; how it runs and ends."""
 
 import io
+import re
 import sys
 from importlib import import_module
 from typing import Annotated
@@ -17,7 +18,13 @@ DONE, BAD_VERDICT, BAD_INPUT = 0, 1, 2  # Ctrl-C: 130, as shells have it
 ELSEWHERE = {
     "report": ("records", "report"), "view": ("records", "view"), "export": ("records", "export_to"),
     "recover": ("records", "recover"), "schema": ("bench", "schema"), "tune": ("compare", "tune_settings"),
-    "sample": ("rig", "sample"),
+    "sample": ("rig", "sample"), "info": ("replay", "info"), "flow": ("identify", "flow"),
+    "validate": ("paper", "validate"), "envelope": ("campaign", "envelope"),
+}  # fmt: skip
+# options that are not called as the argument in Python is, without its unit
+OPTIONS = {
+    "autopilot": "--for", "factor": "--bin", "gps_outages": "--gps-outage", "original": "--merge", "topics": "--topic",
+    "url": "--mavlink",
 }  # fmt: skip
 app = typer.Typer(
     name="flownav",
@@ -88,7 +95,7 @@ def run(app: typer.Typer) -> None:
         with a_run(), announce_compilation("flownav", throughout=True):
             status = app(prog_name="flownav", standalone_mode=False)
     except FlownavError as error:
-        _leave(str(error), BAD_INPUT if isinstance(error, InputError) else BAD_VERDICT)
+        _leave(error.naming(option_of), BAD_INPUT if isinstance(error, InputError) else BAD_VERDICT)
     except typer.TyperException as error:
         if not hasattr(error, "format_message"):
             raise
@@ -98,6 +105,11 @@ def run(app: typer.Typer) -> None:
     except OSError as error:  # a disk that is full, a file that went away
         _leave(f"{error.filename or 'a file'}: {error.strerror or error}", BAD_INPUT)
     sys.exit(status if isinstance(status, int) else DONE)
+
+
+def option_of(argument: str) -> str:
+    """The option that gives what Python gives as this argument: --gps-delay of gps_delay_s."""
+    return OPTIONS.get(argument) or f"--{re.sub('_(s|m)$', '', argument).replace('_', '-')}"
 
 
 def _leave_usage(error: typer.TyperException) -> None:

@@ -10,7 +10,8 @@ import typer
 
 from flownav.cli import options
 from flownav.cli.options import chosen, option, out_option, words
-from flownav.cli.tables import Column, answer, figure, with_ends
+from flownav.cli.output import Column, answer, figure, place, progress, require_between, with_ends, write_text
+from flownav.core.errors import VerdictError
 
 if TYPE_CHECKING:
     from flownav.campaigns.accuracy import Case
@@ -35,8 +36,6 @@ def command(
     """Hold the navigator against its targets, matched and as an ensemble; what its pieces are worth, matched."""
     from flownav.campaigns.accuracy import CASES as EVERY
     from flownav.campaigns.accuracy import flights_of, run_case
-    from flownav.cli.output import place, progress, require_between, write_text
-    from flownav.core.errors import VerdictError
 
     require_between("--flights", flights, 1, 1_000_000)
     require_between("--ablations", ablations, 0, 1_000_000)

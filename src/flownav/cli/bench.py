@@ -7,7 +7,7 @@ import typer
 
 from flownav.cli import options
 from flownav.cli.options import named, option
-from flownav.cli.tables import Column, answer, say, table_of
+from flownav.cli.output import Column, answer, emit, progress, require_between, say, table_of
 
 WIDE = 144  # columns of the table
 COLUMNS = (
@@ -24,7 +24,6 @@ def command(
     as_json: options.Json = False,
 ) -> None:
     """Measure flights on both filters, lanes, the filters' steps, replay, start-up, compile time and memory."""
-    from flownav.cli.output import progress, require_between
     from flownav.studies.benchmark.measures import MEASUREMENTS, measure_all
 
     require_between("--flights", flights, 16, 1_000_000)
@@ -62,7 +61,6 @@ def schema(
     as_json: options.Json = False,
 ) -> None:
     """Print the JSON schema of a command's --json object (by the command's name), or of a file; or list them."""
-    from flownav.cli.output import emit
     from flownav.core.schemas import names, schema_of
 
     if name is not None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from flownav.cli.tables import Column, answer, say, table_of, with_ends
+from flownav.cli.output import Column, answer, folder_place, progress, say, table_of, with_ends
 
 if TYPE_CHECKING:
     from flownav.campaigns.plan import Plan
@@ -109,7 +109,6 @@ def _interval(figure: dict[str, float | None] | None) -> str:
 def fly_rare(plan: Plan, event: str, folder: Path, as_json: bool) -> None:
     """Estimate how probable an event is that hardly ever happens, write it with the most likely flight, and say it."""
     from flownav.api.campaigning import estimate_event, rare_event_of
-    from flownav.cli.output import folder_place, progress
 
     chosen = rare_event_of(plan, event)
     folder = folder_place(folder)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from flownav.cli import options
 from flownav.cli.options import argument, option, out_option, switch
-from flownav.cli.tables import Column, answer, figure, say, table_of
-from flownav.core.errors import InputError
+from flownav.cli.output import Column, answer, figure, progress, require_between, say, table_of
+from flownav.core.errors import InputError, VerdictError
 
 if TYPE_CHECKING:
     from flownav.campaigns.engines import Engine
@@ -50,18 +50,16 @@ def command(
 ) -> None:
     """Fly what a requirement asks for: pass, fail or not shown, with its risk; exit status 1 unless it passes."""
     from flownav.campaigns.certification.cells import plan_of
-    from flownav.campaigns.certification.certify import TOLD
-    from flownav.campaigns.ranking import LEAST
+    from flownav.campaigns.certification.certify import FLIGHTS_TOLD
+    from flownav.campaigns.ranking import LEAST_ROWS
     from flownav.campaigns.requirement import load_requirement
     from flownav.campaigns.run import engine_named, require_engine
-    from flownav.cli.output import require_between
-    from flownav.core.errors import VerdictError
 
     if flights is not None:
         require_between("--flights", flights, 1, 100_000_000)
-    if ranking and (ranking & (ranking - 1) or not LEAST <= ranking <= 65_536):
-        raise InputError(f"--ranking {ranking}: must be 0 or a power of 2 from {LEAST} to 65536")
-    require_between("--records", records, 0, TOLD)
+    if ranking and (ranking & (ranking - 1) or not LEAST_ROWS <= ranking <= 65_536):
+        raise InputError(f"--ranking {ranking}: must be 0 or a power of 2 from {LEAST_ROWS} to 65536")
+    require_between("--records", records, 0, FLIGHTS_TOLD)
     require_engine(engine)
     asked = load_requirement(requirement)
     if plan_only:
@@ -86,7 +84,6 @@ def _fly(
     from flownav.campaigns.ranking import flights_of
     from flownav.campaigns.store import Store
     from flownav.cli.campaign_said import watching
-    from flownav.cli.output import progress
 
     inputs = max(len(cell.setup.ensemble().entries) for cell in plan.cells)
     require_planned(plan, folder)
@@ -102,13 +99,13 @@ def _fly(
 
 def _say_plan(asked: Requirement, as_json: bool) -> None:
     """How many flights each requirement needs, by the failures that it may have, and how many the file asks for."""
-    from flownav.campaigns.certification.envelope import PLANS
+    from flownav.campaigns.certification.envelope import PLAN_FAILURES
     from flownav.campaigns.requirement import needed_by
 
     rows = [
         {
             "requirement": table.sentence(),
-            "needed": {str(failures): needed_by(table, failures) for failures in PLANS},
+            "needed": {str(failures): needed_by(table, failures) for failures in PLAN_FAILURES},
             "allowed_failures": table.allowed_failures,
             "flights": needed_by(table),
         }
@@ -119,7 +116,7 @@ def _say_plan(asked: Requirement, as_json: bool) -> None:
     answer(plan, as_json, lambda: say(said, table_of(PLAN, rows, left=1), wide=WIDE))
 
 
-RANKED = 5  # inputs that are printed
+INPUTS_RANKED = 5  # inputs that are printed
 
 
 def show(facts: dict[str, Any]) -> None:
@@ -137,7 +134,7 @@ def show(facts: dict[str, Any]) -> None:
     if facts["ranking"] and facts["ranking_of"] == "nothing":
         lines.append(f"rank      nothing: all {facts['ranking_flights']} flights of the ranking have the same outcome")
     elif facts["ranking"]:
-        lines += [f"rank      {_index(row, 'input')}" for row in facts["ranking"][:RANKED]]
+        lines += [f"rank      {_index(row, 'input')}" for row in facts["ranking"][:INPUTS_RANKED]]
         lines += [f"known     {_index(row, 'known')}" for row in facts["split"]]
     say(*lines, f"page      {facts['out']}", wide=WIDE, soft=True)
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from flownav.cli import options
 from flownav.cli.options import named, option, out_option
-from flownav.cli.output import writing
-from flownav.cli.tables import Column, answer, plain_look, say, say_files, table, table_of
+from flownav.cli.output import Column, answer, place, plain_look, progress, say, say_files, table, table_of, writing
+from flownav.core.errors import InputError
 
 if TYPE_CHECKING:
     from flownav.studies.compare.job import Setting
@@ -42,9 +42,7 @@ def command(
     as_json: options.Json = False,
 ) -> None:
     """Score every log by every setting, beside dead reckoning and its autopilot; or lay records over each other."""
-    from flownav.cli.output import place, progress
     from flownav.cli.replay import numbers
-    from flownav.core.errors import InputError
     from flownav.core.measurement import Sensor
     from flownav.logs.open_log import open_flight
     from flownav.replays.session import table_windows
@@ -92,7 +90,6 @@ def _records(paths: list[Path], out: Path | None, *, as_json: bool) -> None:
 
 def settings_asked(asked: list[str], sensor: Path | None) -> list[Setting]:
     """Each `--with` as what a replay takes; InputError where a file is not right, or one is named twice."""
-    from flownav.core.errors import InputError
     from flownav.core.parameter_files import load
     from flownav.navigation.settings import NavigatorSettingsFile
     from flownav.navigation.settings_of import settings_of
@@ -183,8 +180,6 @@ def tune_settings(
     as_json: options.Json = False,
 ) -> None:
     """Propose settings from logs: fitted on every other window of the flights, accepted only if the rest gain by it."""
-    from flownav.cli.output import place, progress
-    from flownav.core.errors import InputError
     from flownav.core.parameter_files import load
     from flownav.core.provenance import command_line
     from flownav.logs.open_log import open_flight

@@ -9,8 +9,7 @@ import typer
 
 from flownav.cli import options
 from flownav.cli.options import FAULTS, numbers, one_of, option, switch, words
-from flownav.cli.output import progress, require_between
-from flownav.cli.tables import Column, answer, figure, say, table_of
+from flownav.cli.output import Column, answer, figure, progress, require_between, say, table_of
 from flownav.core.errors import InputError
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from flownav.cli import options
 from flownav.cli.options import chosen, option, out_option, switch
-from flownav.cli.tables import answer, figure, say, table
+from flownav.cli.output import answer, figure, progress, record_place, require_between, save, say, table
 from flownav.core.errors import InputError, VerdictError
 
 if TYPE_CHECKING:
@@ -51,7 +51,6 @@ def command(
     from flownav.api.calls import split
     from flownav.api.flying import MOST_FLIGHTS, fly_setup
     from flownav.api.scenario import Scenario
-    from flownav.cli.output import progress, record_place, require_between, save
     from flownav.simulation.assemble import assemble
 
     require_between("--flights", flights, 1, MOST_FLIGHTS)

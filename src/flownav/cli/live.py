@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from flownav.cli import options
 from flownav.cli.options import chosen, named, one_of, option, switch
-from flownav.cli.output import require_between, require_recordable
-from flownav.cli.tables import answer, say, say_files
+from flownav.cli.output import answer, require_between, require_recordable, say, say_files
+from flownav.core.errors import InputError, VerdictError
 
 if TYPE_CHECKING:
     from flownav.live.loop import Latency
@@ -74,7 +74,6 @@ def command(
 ) -> None:
     """Navigate a vehicle that is connected by MAVLink: fuse its sensors, send the estimate, show and record it."""
     from flownav.cli.live_setup import run as run_setup
-    from flownav.core.errors import InputError
     from flownav.live.link import parse_url
     from flownav.live.options import Limits
     from flownav.live.reception import accepted_by
@@ -105,7 +104,6 @@ def _navigate(
     url: str, options: Options, record: Path | None, duration_s: float | None, *, force: bool, as_json: bool
 ) -> None:
     """Navigate until asked to end, and say what came of it. VerdictError where nobody was heard or kept."""
-    from flownav.core.errors import VerdictError
     from flownav.live.byte_links import open_link
     from flownav.live.display import on_terminal
     from flownav.live.filtering import Keeper
@@ -149,7 +147,6 @@ def _navigate(
 @contextmanager
 def _recording(url: str, path: Path | None, options: Options, *, force: bool, shown: bool) -> Iterator[Recorder | None]:
     """The recorder, where a record is asked for; when the session breaks off, its journal stays and is named."""
-    from flownav.core.errors import VerdictError
     from flownav.live.recorder import Recorder
 
     recorder = Recorder(path, options, force=force, failed=_say_once(shown)) if path is not None else None

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from flownav.cli.tables import Column, answer, figure, say, table_of
+from flownav.cli.output import Column, answer, figure, say, table_of
 
 if TYPE_CHECKING:
     from flownav.live.setup.check import Report

@@ -14,6 +14,7 @@ import typer
 
 from flownav.cli.output import require_between
 from flownav.core.errors import InputError
+from flownav.core.text import number
 
 Range = tuple[float, float]
 SCENARIOS = ("takeoff", "landing", "gusty", "pad_return", "approach")
@@ -200,7 +201,6 @@ def _parts(option: str, given: Sequence[str]) -> list[str]:
 
 def numbers(option: str, given: Sequence[str], low: float, high: float) -> list[float]:
     """Every number of such an option, in order. InputError where one is none, or out of range."""
-    from flownav.core.text import number
 
     found = []
     for word in _parts(option, given):

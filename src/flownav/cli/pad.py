@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli import options
+from flownav.cli import options, output
 from flownav.cli.options import chosen, numbers, option, out_option
-from flownav.cli.tables import Column, answer, figure, plain_look, say, table_of
+from flownav.core.errors import InputError
 from flownav.core.text import finite
 
 if TYPE_CHECKING:
@@ -35,23 +35,23 @@ PICTURES = "A folder for one frame of each flight and height."
 PRINT = "Only write the target as a PNG of true size."
 YOURS = "Your pictures: a folder, pictures, or one video. None: measure."
 FOUND = (
-    Column("frame", "frame", ""),
-    Column("tan forward", lambda row: _of_fix(row, "tan_forward", ".5f")),
-    Column("tan right", lambda row: _of_fix(row, "tan_right", ".5f")),
-    Column("distance [m]", lambda row: _of_fix(row, "distance_m", ".4f")),
-    Column("heading [deg]", lambda row: _of_fix(row, "heading_rad", ".2f", 57.29577951308232)),
-    Column("what became of it", "reason"),
+    output.Column("frame", "frame", ""),
+    output.Column("tan forward", lambda row: _of_fix(row, "tan_forward", ".5f")),
+    output.Column("tan right", lambda row: _of_fix(row, "tan_right", ".5f")),
+    output.Column("distance [m]", lambda row: _of_fix(row, "distance_m", ".4f")),
+    output.Column("heading [deg]", lambda row: _of_fix(row, "heading_rad", ".2f", 57.29577951308232)),
+    output.Column("what became of it", "reason"),
 )
 MEASURED = (
-    Column("height [m]", "height_m", "g"),
-    Column("speed [m/s]", "speed_m_s", "g"),
-    Column("rate [rad/s]", "image_rate_rad_s", ".2f"),
-    Column("in view", lambda row: f"{row['in_view']}/{row['frames']}"),
-    Column("found", "found"),
-    Column("wrong", "wrong"),
-    Column("angle [mrad]", "angle_sigma_rad", ".2f", 1e3),
-    Column("distance [%]", "distance_sigma", ".2f", 1e2),
-    Column("heading [mrad]", "heading_sigma_rad", ".2f", 1e3),
+    output.Column("height [m]", "height_m", "g"),
+    output.Column("speed [m/s]", "speed_m_s", "g"),
+    output.Column("rate [rad/s]", "image_rate_rad_s", ".2f"),
+    output.Column("in view", lambda row: f"{row['in_view']}/{row['frames']}"),
+    output.Column("found", "found"),
+    output.Column("wrong", "wrong"),
+    output.Column("angle [mrad]", "angle_sigma_rad", ".2f", 1e3),
+    output.Column("distance [%]", "distance_sigma", ".2f", 1e2),
+    output.Column("heading [mrad]", "heading_sigma_rad", ".2f", 1e3),
 )
 
 
@@ -78,18 +78,18 @@ def command(
     as_json: options.Json = False,
 ) -> None:
     """Where the pad is from the lens: angles, distance, heading; and how well, by height."""
-    from flownav.cli.output import folder_place, place
     from flownav.lab.optics.pad import PadTarget, checked
     from flownav.lab.optics.pad_trial import Trials
 
     target = checked(PadTarget(side, pattern, code))
     if print_to is not None:
-        return _print_target(target, place(print_to, force=force), as_json)
+        return _print_target(target, output.place(print_to, force=force), as_json)
     if frames:
         found = _found(frames, target, focal, image_x)
-        return answer(found, as_json, lambda: _show_found(found))
-    datasheet = None if out is None else place(out, force=force)
-    frames_in = None if pictures is None else folder_place(pictures)
+        said = f"found in {found['found']} of {found['frames']} frames"
+        return output.answer(found, as_json, lambda: output.say(output.table_of(FOUND, found["per_frame"]), said))
+    datasheet = None if out is None else output.place(out, force=force)
+    frames_in = None if pictures is None else output.folder_place(pictures)
     at_m = sorted(set(numbers("--heights", heights, 0.05, 50.0)))
     at_m_s = sorted(set(numbers("--speeds", speeds, 0.0, 50.0)))
     trials = Trials(at_m, at_m_s, flights, count, math.radians(tilt), seed)
@@ -97,7 +97,7 @@ def command(
     if datasheet is not None:
         facts["datasheet"] = _write_datasheet(datasheet, facts, target, camera, focus, mounting)
     plain = _plain(facts)
-    answer(plain, as_json, lambda: _show_measured(plain))
+    output.answer(plain, as_json, lambda: _show_measured(plain))
 
 
 def _print_target(target: PadTarget, picture: Path, as_json: bool) -> None:
@@ -106,7 +106,7 @@ def _print_target(target: PadTarget, picture: Path, as_json: bool) -> None:
 
     print_target(target, picture)
     facts: dict[str, Any] = {"target": target._asdict(), "picture": str(picture)}
-    answer(facts, as_json, lambda: typer.echo(f"{picture}: print it at 100 %, and measure its side"))
+    output.answer(facts, as_json, lambda: typer.echo(f"{picture}: print it at 100 %, and measure its side"))
 
 
 # -- a user's own pictures ------------------------------------------------------------------------------------------
@@ -114,7 +114,6 @@ def _found(frames: list[Path], target: PadTarget, focal_px: float | None, image_
     import numpy as np
 
     from flownav.core.compile import announce_compilation
-    from flownav.core.errors import InputError
     from flownav.lab.optics.frame_files import read_frames
     from flownav.lab.optics.pad_fix import find_pad
 
@@ -135,12 +134,8 @@ def _found(frames: list[Path], target: PadTarget, focal_px: float | None, image_
     return {"target": target._asdict(), "focal_px": focal_px, "frames": len(rows), "found": found, "per_frame": rows}
 
 
-def _show_found(facts: dict[str, Any]) -> None:
-    say(table_of(FOUND, facts["per_frame"]), f"found in {facts['found']} of {facts['frames']} frames")
-
-
 def _of_fix(row: dict[str, Any], key: str, form: str, scale: float = 1.0) -> str:
-    return figure(row[key], form, scale) if row["reason"] == "found" else ""
+    return output.figure(row[key], form, scale) if row["reason"] == "found" else ""
 
 
 # -- rendered frames --------------------------------------------------------------------------------------------------
@@ -152,13 +147,12 @@ def _measured(
     tilt_deg: float,
     pictures: Path | None,
 ) -> dict[str, Any]:
-    from flownav.cli.output import progress
     from flownav.core.compile import announce_compilation
     from flownav.lab.optics.pad_statistics import laws_of
     from flownav.lab.optics.pad_trial import camera_named, fly_cameras
 
     trial, shown = camera_named(camera_name, focus_m), target.inner  # the outer is the same tag, five times as large
-    with announce_compilation("pad"), progress("flights", trials.flights) as advance:
+    with announce_compilation("pad"), output.progress("flights", trials.flights) as advance:
         frames = fly_cameras(trial, shown, trials, advance, pictures)
     laws, cells = laws_of(frames)
     return {
@@ -182,7 +176,6 @@ def _plain(facts: dict[str, Any]) -> dict[str, Any]:
 def _write_datasheet(
     out: Path, facts: dict[str, Any], target: PadTarget, camera_name: str, focus_m: float | None, mounting_deg: float
 ) -> str:
-    from flownav.cli.output import write_text
     from flownav.core.provenance import command_line
     from flownav.lab.optics.pad_datasheet import Assumed, datasheet
     from flownav.lab.optics.pad_trial import camera_named
@@ -193,17 +186,17 @@ def _write_datasheet(
     assumed = Assumed(float(sheet.rate_hz), float(sheet.latency_s), float(sheet.jitter_s), lens_m, mounting_deg)
     trial = camera_named(camera_name, focus_m)
     text = datasheet(facts["laws"], trial, camera_name, target, assumed, command_line())
-    write_text(out, text, newline=None)
+    output.write_text(out, text, newline=None)
     PadCameraSheet.read(out)
     return str(out)
 
 
 def _show_measured(facts: dict[str, Any]) -> None:
     target, camera, laws = facts["target"], facts["camera"], facts["laws"]
-    say(
+    output.say(
         f"{target['pattern']} of {target['side_m']:g} m, tilt to {facts['tilt_deg']:g} deg; "
         f"{facts['flights']} cameras {camera['name']}, {laws['frames']} frames",
-        table_of(MEASURED, facts["cells"], left=0, **plain_look()),
+        output.table_of(MEASURED, facts["cells"], left=0, **output.plain_look()),
         *_law_lines(laws),
         *([f"datasheet: {facts['datasheet']}"] if "datasheet" in facts else []),
         wide=WIDE,

@@ -7,8 +7,8 @@ import typer
 
 from flownav.cli import options
 from flownav.cli.options import chosen, named, option, out_option
-from flownav.cli.output import writing
-from flownav.cli.tables import answer
+from flownav.cli.output import answer, folder_place, place, require_recordable, several_place, told, writing
+from flownav.core.errors import InputError, VerdictError
 
 NO_FILE = "none is written; without a display RECORD.rrd"
 
@@ -24,8 +24,6 @@ def report(
     as_json: options.Json = False,
 ) -> None:
     """Write a record's report: figures, scores, events and provenance in one HTML file that works offline."""
-    from flownav.cli.output import place
-    from flownav.core.errors import InputError
     from flownav.core.record import Record
     from flownav.report.html import write_report
 
@@ -49,9 +47,8 @@ def view(
 
     Without --out a window opens; on a machine without a display the file is written beside the record instead.
     """
-    from flownav.cli.output import place
     from flownav.core.record import Record
-    from flownav.export.viewing.view import SUFFIX, has_display, show, write_rrd
+    from flownav.export.viewing import SUFFIX, has_display, show, write_rrd
 
     beside = out is None and not has_display()
     path = record.with_suffix(SUFFIX) if beside else out
@@ -83,7 +80,6 @@ def export_to(
     as_json: options.Json = False,
 ) -> None:
     """Write a record for other tools: Foxglove, evo, spreadsheets, data frames, PlotJuggler, Google Earth, maps."""
-    from flownav.cli.output import folder_place, place, several_place
     from flownav.core.record import Record
     from flownav.export.formats import FOLDERS, FRAMED, destination, export, written_files
     from flownav.export.paths import origin_from
@@ -113,8 +109,6 @@ def recover(
     as_json: options.Json = False,
 ) -> None:
     """Make the record of a live session that was killed, or could not write it; the journal stays."""
-    from flownav.cli.output import require_recordable, told
-    from flownav.core.errors import InputError, VerdictError
     from flownav.core.free_names import free_name
     from flownav.live.recovery import recovered
     from flownav.live.writing import is_locked, journal_of

@@ -8,11 +8,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from flownav.cli import options
 from flownav.cli.options import chosen, option, out_option, switch
-from flownav.cli.tables import Column, answer, figure, say, say_files, table, table_of
+from flownav.cli.output import (
+    Column,
+    answer,
+    figure,
+    plain_look,
+    progress,
+    record_place,
+    save,
+    say,
+    say_files,
+    table,
+    table_of,
+)
+from flownav.core.errors import InputError, VerdictError
+from flownav.core.text import number
 
 if TYPE_CHECKING:
     from flownav.core.record import Record
     from flownav.replays.prepare import ReplayOptions
+
 
 OUTAGE_COLUMNS = (
     Column("GPS cut [s]", lambda cut: f"{cut['t0']:g} to {cut['t1']:g}"),
@@ -46,8 +61,6 @@ def command(
     """Fuse a recorded flight: its trajectory, its errors against its own GPS, and the drift through GPS outages."""
     from flownav.api.calls import own_filter
     from flownav.api.replaying import replay_log
-    from flownav.cli.output import progress, record_place, save
-    from flownav.core.errors import VerdictError
     from flownav.core.parameter_files import load
     from flownav.logs.open_log import open_flight
     from flownav.logs.ros.topics import asked_topics
@@ -84,9 +97,6 @@ def _options(gps_delay_s: float, outages: list[str], flow_scale: str, *, no_flow
 def numbers(option: str, text: str, separator: str, count: int, form: str) -> tuple[float, ...]:
     """An option's numbers; InputError where it has another form than it should."""
     from math import isfinite
-
-    from flownav.core.errors import InputError
-    from flownav.core.text import number
 
     try:
         found = tuple(number(part) for part in text.split(separator))
@@ -194,3 +204,63 @@ def _smoothed_errors(scores: dict[str, Any]) -> str:
         truth = scores["truth"]
         said.append(f"against {truth['reference']} {truth['horizontal_rms_m']:.2f} m rms horizontally")
     return "; ".join(said) or "nothing to compare it with"
+
+
+STREAMS = (
+    Column("sensor", "sensor"),
+    Column("readings", "count"),
+    Column("rate [Hz]", "rate_hz", ".1f"),
+    Column("from [s]", "start_s", ".1f"),
+    Column("to [s]", "end_s", ".1f"),
+    Column("gap [s]", "largest_gap_s", ".2f"),
+    Column("no data [%]", lambda stream: f"{100 * stream['no_data_share']:.0f}" if stream["no_data_share"] else ""),
+)
+
+
+def info(
+    log: options.Log,
+    flow_instance: options.FlowInstance = None,
+    topic: options.Topic = None,
+    as_json: options.Json = False,
+) -> None:
+    """Show what a log holds: sensors, rates, gaps, thrown-away rows, limits, signs, and what it lacks."""
+    from flownav.core.compile import announce_compilation
+    from flownav.logs.open_log import open_log
+    from flownav.logs.ros.topics import asked_topics
+    from flownav.studies.inspection import summarise
+
+    read = open_log(log, flow_instance=flow_instance, topics=asked_topics(topic or []))
+    with announce_compilation("inspection"):
+        facts = summarise(read)
+    answer(facts, as_json, lambda: _print(facts))
+
+
+def _print(facts: dict[str, Any]) -> None:
+    """Print the figures for people."""
+    from rich.padding import Padding
+
+    def padded(text: str) -> Padding:
+        return Padding(text, (0, 0, 0, 2))
+
+    say(f"{facts['log']}: {facts['end_s'] - facts['start_s']:.1f} s", f"Verdict: {facts['verdict']}")
+    say(*(f"Cannot be replayed: {obstacle}" for obstacle in facts["obstacles"]))
+    say(table_of(STREAMS, facts["streams"], left=1, fixed=1, **plain_look(edge=False)))
+    for s in facts["streams"]:
+        if s["rejected"]:
+            rejected = ", ".join(f"{count} {reason}" for reason, count in s["rejected"].items())
+            say(f"Thrown away of {s['sensor']}: {rejected}")
+    say(*(f"Clock: {line}" for line in facts["clock"] or ["nothing found"]))
+    for name, limit in facts["limits"].items():
+        said, share = f"Stated limits of {name}: {limit['low']:g} to {limit['high']:g}", limit["outside_share"]
+        say(said if share is None else f"{said}; {100 * share:.1f} % of readings outside")
+    say(f"Compared: {facts['checked']}", *(f"Warning: {text}" for text in facts["warnings"]))
+    if facts["absences"]:
+        say("What is missing, and what is done instead:")
+        say(*(padded(f"{absence['what']}: {absence['instead']}") for absence in facts["absences"]))
+    own, truth = facts["autopilot"], facts["truth"]
+    if own:
+        say(f"The autopilot's own estimate: {own['name']}, {own['count']} rows at {figure(own['rate_hz'], '.1f')} Hz")
+        say(*([padded(autopilot_errors(own))] if own["against"] else []))
+    if truth:
+        say(f"Reference: {truth['count']} rows at {figure(truth['rate_hz'], '.1f')} Hz")
+    say(*(f"Note: {note}" for note in facts["notes"]))

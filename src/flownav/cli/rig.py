@@ -9,11 +9,11 @@ import typer
 
 from flownav.cli import options
 from flownav.cli.options import SAMPLES, argument, chosen, numbers, option, out_option, switch, words
-from flownav.cli.output import emit
-from flownav.cli.tables import Column, answer, say, table_of
+from flownav.cli.output import Column, answer, emit, folder_place, progress, say, table_of
+from flownav.core.errors import InputError
 
 if TYPE_CHECKING:
-    from flownav.export.samples.writing import Written
+    from flownav.export.samples.kinds import Written
     from flownav.lab.rig.experiment import RigLog, RigSettings
 
 HEIGHTS_M = ["0.6"]
@@ -54,7 +54,6 @@ def command(
     as_json: options.Json = False,
 ) -> None:
     """Swing a PX4FLOW over a pad beside an encoder and log both: rig.csv and rig.toml, a folder a run."""
-    from flownav.cli.output import folder_place
     from flownav.lab.rig.experiment import RigSettings
 
     heights = numbers("--height", height, 0.01, 100.0)
@@ -71,11 +70,9 @@ def command(
 
 def _swung(settings: RigSettings, heights_m: list[float], folder: Path) -> list[dict[str, Any]]:
     """Every run at every height, written in a folder of its own; what each was."""
-    from flownav.cli.output import progress
     from flownav.core.compile import announce_compilation
     from flownav.core.provenance import command_line
-    from flownav.lab.rig.experiment import run_campaign
-    from flownav.lab.rig.log_folder import check_rig_folder, run_folders, write_rig_folder
+    from flownav.lab.rig.experiment import check_rig_folder, run_campaign, run_folders, write_rig_folder
 
     count = len(heights_m) * settings.runs
     rows, folders = [], list(run_folders(folder, count))
@@ -115,10 +112,8 @@ def sample(
     """Write sample logs: a simulated flight in the formats of PX4, ArduPilot, MAVLink and CSV, a rig, and a record."""
     from importlib.util import find_spec
 
-    from flownav.core.errors import InputError
     from flownav.export.samples.kinds import SAMPLES as MADE
-    from flownav.export.samples.kinds import sample_of
-    from flownav.export.samples.writing import write_samples
+    from flownav.export.samples.kinds import sample_of, write_samples
 
     folder = out or Path("samples")
     asked = [sample_of(kind) for kind in (words("KIND", kinds) if kinds else [])]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from flownav.cli import options
 from flownav.cli.options import VEHICLES, argument, switch
-from flownav.cli.tables import answer, plain_look, say, table
+from flownav.cli.output import answer, plain_look, say, table
 from flownav.core.errors import VerdictError
 
 if TYPE_CHECKING:

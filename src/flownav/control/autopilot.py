@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from flownav.control import go_around
 from flownav.control.gains import AutopilotGains
-from flownav.control.guidance import Reference
+from flownav.control.go_around import Reference
 from flownav.core.compile import clamp, equation, magnitude, replacing, smaller
 from flownav.core.frames import GRAVITY_M_S2, Rotation, heading_cosine_sine, to_earth
 

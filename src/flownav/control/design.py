@@ -73,10 +73,6 @@ def helicopter_gains(
         **_loop("roll", roll, ROLL_INTEGRAL_1_S, ROLL_LEAD_S),
         **_loop("yaw_rate", yaw, YAW_RATE_INTEGRAL_1_S),
         heading_gain=HEADING_1_S,
-        collective_trim_rad=hover.collective_rad,
-        pedal_trim_rad=hover.pedal_rad,
-        lon_trim_rad=hover.lon,
-        lat_trim_rad=hover.lat,
         **_at_rest(vehicle, hover),
         idle_collective_rad=idle_collective_rad,
         pedal_per_collective=_pedal_per_collective(vehicle, hover),
@@ -84,10 +80,12 @@ def helicopter_gains(
 
 
 def _at_rest(vehicle: AnyVehicle, hover: AnyTrim) -> dict[str, float]:
-    """How a vehicle hangs in hover, and how high it stands."""
+    """The controls with which a vehicle hangs in hover, how it hangs, and how high it stands."""
+    trims = (f"{name}_trim_rad" for name in ("lon", "lat", "collective", "pedal"))
     pitch_sine, roll_sine = math.sin(hover.pitch_rad), math.sin(hover.roll_rad) * math.cos(hover.pitch_rad)
     standing = {"pad_pos_d_m": -vehicle.cg_above_skid_m, "skids_below_cg_m": vehicle.cg_above_skid_m}
-    return {"pitch_trim_sine": pitch_sine, "roll_trim_sine": roll_sine, **standing}
+    hanging = dict(zip(trims, hover.controls, strict=True))
+    return {**hanging, "pitch_trim_sine": pitch_sine, "roll_trim_sine": roll_sine, **standing}
 
 
 def _loop(name: str, gain: float, integral_1_s: float, lead_s: float | None = None) -> dict[str, float]:
@@ -145,10 +143,6 @@ def multirotor_gains(
         cyclic_limit_rad=TILT_LIMIT_SHARE,
         heading_gain=ROTORS_HEADING_1_S,
         pedal_limit_rad=YAW_LIMIT_SHARE,
-        collective_trim_rad=hover.controls.col,
-        pedal_trim_rad=hover.controls.ped,
-        lon_trim_rad=hover.controls.lon,
-        lat_trim_rad=hover.controls.lat,
         **_at_rest(vehicle, hover),
         idle_collective_rad=vehicle.idle_share,
         spool_rate_rad_s=hover.controls.col / SPOOL_S,

@@ -23,11 +23,18 @@ from typing import Any
 from flownav.core.compiling.beside import compile_beside
 from flownav.core.compiling.bundles import (
     FlatAccess,
+    columns_of,
     flat_access,
+    gathering,
     lane_access,
     passing,
+    places_of,
     replacing,
+    row_of,
+    row_store,
+    row_view,
     stepping,
+    width_of,
     write_function,
 )
 from flownav.core.compiling.cache import depends_also
@@ -48,11 +55,18 @@ from flownav.core.compiling.engine import LANES_WIDE, equation, kernel, procedur
 from flownav.core.compiling.pointers import invoke, pointer
 from flownav.core.compiling.progress import announce_compilation
 from flownav.core.compiling.records import Layout, OnLanes, compiled, dressed
-from flownav.core.compiling.rows import columns_of, gathering, places_of, row_of, row_store, row_view, width_of
-from flownav.core.compiling.runge_kutta import STAGES, runge_kutta
-from flownav.core.compiling.runner import NoDeviceError, Runner
-from flownav.core.compiling.scalars import bits_from_float, clamp, float_from_bits, larger, magnitude, smaller, squared
-from flownav.core.compiling.strided import WARP, strided
+from flownav.core.compiling.scalars import (
+    STAGES,
+    bits_from_float,
+    clamp,
+    float_from_bits,
+    larger,
+    magnitude,
+    runge_kutta,
+    smaller,
+    squared,
+)
+from flownav.core.compiling.strided import WARP, NoDeviceError, Runner, strided
 from flownav.core.compiling.units import Unit, unit
 
 Work = Any  # the lane buffer: a flat float64 array in Python, the address of its first element in kernels (`pointer`)
@@ -60,68 +74,6 @@ Lanes = tuple[int, ...]  # how many lanes a kernel has, as part of a type: `len(
 
 ONE_LANE: Lanes = (0,)
 LANES: Lanes = (0,) * LANES_WIDE
-
-__all__ = [
-    "LANES",
-    "LANES_WIDE",
-    "ONE_LANE",
-    "STAGES",
-    "WARP",
-    "FlatAccess",
-    "Lanes",
-    "Layout",
-    "NoDeviceError",
-    "OnLanes",
-    "Runner",
-    "Unit",
-    "Work",
-    "announce_compilation",
-    "arccos",
-    "arcsin",
-    "arctan2",
-    "bits_from_float",
-    "clamp",
-    "columns_of",
-    "compile_beside",
-    "compiled",
-    "cos",
-    "cosh",
-    "cosine_of_eighth",
-    "depends_also",
-    "device_runner",
-    "dressed",
-    "equation",
-    "exp",
-    "flat_access",
-    "float_from_bits",
-    "gathering",
-    "invoke",
-    "kernel",
-    "lane_access",
-    "larger",
-    "log_of_unit",
-    "magnitude",
-    "passing",
-    "places_of",
-    "pointer",
-    "procedure",
-    "replacing",
-    "row_of",
-    "row_store",
-    "row_view",
-    "runge_kutta",
-    "sin",
-    "sine_of_eighth",
-    "sinh",
-    "smaller",
-    "sparingly",
-    "squared",
-    "stepping",
-    "strided",
-    "unit",
-    "width_of",
-    "write_function",
-]
 
 
 def device_runner(instead: Callable[..., None]) -> Runner:

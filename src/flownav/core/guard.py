@@ -105,10 +105,7 @@ def a_record_place(path: Path, inputs: Iterable[Path] = (), *, force: bool) -> P
 
     InputError as of `an_output`, but that what is there may be a live record; with force it must be a record.
     """
-    info = _status(path, _unfollowed)
-    if info is not None:
-        _check_kind(path, info)
-    _check_no_input(path, info, inputs)
+    info = _status_of_output(path, inputs)
     if force and info is not None and info.st_size and _manifest_of(path) is None:
         raise InputError(f"{path}: is there already and is no record, so it is not replaced; give another name")
     return path
@@ -121,14 +118,11 @@ def an_output(path: Path, inputs: Iterable[Path] = (), *, signed_by: Path | None
     this one, where it does not do so itself. InputError where the path is one of them or
     would become one, is a link, a folder, a FIFO, a socket or a device, or holds what flownav does not replace.
     """
-    info = _status(path, _unfollowed)
-    if info is not None:
-        _check_kind(path, info)
-    _check_no_input(path, info, inputs)
+    info = _status_of_output(path, inputs)
     if info is not None and info.st_size and not _is_ours(signed_by or path):
         raise InputError(
             f"{path}: is there already and was not written by flownav, or cannot be made again, so it is not replaced; "
-            "give another --out, or move it away"
+            "give another name, or move it away"
         )
     return path
 
@@ -139,7 +133,7 @@ def an_output_folder(path: Path) -> Path:
     if info is not None and stat.S_ISLNK(info.st_mode):
         raise InputError(_through_a_link(path))
     if info is not None and not stat.S_ISDIR(info.st_mode):
-        raise InputError(f"{path}: cannot be written (it is {_special(info) or 'a file'}); give a folder as --out")
+        raise InputError(f"{path}: cannot be written (it is {_special(info) or 'a file'}); give a folder's name")
     return path
 
 
@@ -170,18 +164,21 @@ def folder_written_whole(path: Path) -> Iterator[Path]:
         yield temporary
 
 
-def _check_kind(path: Path, info: os.stat_result) -> None:
-    if stat.S_ISLNK(info.st_mode):
+def _status_of_output(path: Path, inputs: Iterable[Path]) -> os.stat_result | None:
+    """What the system says of a file to be written. InputError where it is none, or is read."""
+    info = _status(path, _unfollowed)
+    if info is not None and stat.S_ISLNK(info.st_mode):
         raise InputError(_through_a_link(path))
-    if stat.S_ISDIR(info.st_mode):
-        raise InputError(f"{path}: cannot be written (it is a folder); give a file's name as --out")
-    kind = _special(info)
-    if kind:
-        raise InputError(f"{path}: cannot be written ({kind}); give another --out")
+    if info is not None and stat.S_ISDIR(info.st_mode):
+        raise InputError(f"{path}: cannot be written (it is a folder); give a file's name")
+    if info is not None and (kind := _special(info)):
+        raise InputError(f"{path}: cannot be written ({kind}); give another name")
+    _check_no_input(path, info, inputs)
+    return info
 
 
 def _through_a_link(path: Path) -> str:
-    return f"{path}: cannot be written (nothing is written through a symbolic link); give the name it leads to as --out"
+    return f"{path}: cannot be written (nothing is written through a symbolic link); give the name it leads to"
 
 
 def _check_no_input(path: Path, info: os.stat_result | None, inputs: Iterable[Path]) -> None:
@@ -195,10 +192,10 @@ def _check_no_input(path: Path, info: os.stat_result | None, inputs: Iterable[Pa
         taken = None if known is None else known.file(info)
         if taken is not None:
             also = "" if str(taken) == str(path) else f" (the same file as {taken})"
-            raise InputError(f"{path}{also}: this would replace what it is made from; give another --out")
+            raise InputError(f"{path}{also}: this would replace what it is made from; give another name")
         folder = None if known is None or not in_folders else known.folder_of(path)
         if folder is not None:
-            raise InputError(f"{path}: lies in {folder}, which this run reads, as one of its files; give another --out")
+            raise InputError(f"{path}: lies in {folder}, which this run reads, as one of its files; give another name")
 
 
 def _is_ours(path: Path) -> bool:

@@ -18,7 +18,7 @@ from flownav.core.errors import InputError
 
 PROVENANCE_KEYS = {"value", "uncertainty", "source"}
 MOST_BYTES = 4_000_000  # of a file: the largest that ships has 30 000
-DEEPEST = 20  # tables and lists in each other
+DEEPEST_NESTING = 20  # tables and lists in each other
 LONGEST_SHOWN = 300  # characters of a key, a value or a sentence in a message
 
 
@@ -108,7 +108,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         if len(content) > MOST_BYTES:
             raise InputError(f"{path}: more than {MOST_BYTES:,} bytes; a parameter file is needed")
         entries = tomllib.loads(content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n"))
-        if _deeper_than(entries, DEEPEST):
+        if _deeper_than(entries, DEEPEST_NESTING):
             raise RecursionError
         return entries
     except FileNotFoundError:

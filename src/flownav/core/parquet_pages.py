@@ -15,7 +15,7 @@ GROWN, STORED, DATA_AT, DICTIONARY_AT = 6, 7, 9, 11  # of ColumnMetaData
 PAGE_GROWN, PAGE_STORED, DATA_PAGE, DATA_PAGE_V2 = 2, 3, 5, 8  # of PageHeader
 ENCODING = {DATA_PAGE: 2, DATA_PAGE_V2: 4}  # where a data page's header says its encoding
 DELTA_BYTE_ARRAY = 7  # each text a part of the one before: what it grows to stands nowhere
-DEEPEST = 8  # of structures in one another
+DEEPEST_NESTING = 8  # of structures in one another
 TRUE, FALSE, BYTE, I16, I32, I64, DOUBLE, BINARY, LIST, SET, MAP, STRUCT = range(1, 13)
 
 
@@ -90,7 +90,7 @@ def _number(fields: dict[int, Any], field: int) -> int:
 
 def _structure(data: bytes, at: int, depth: int) -> tuple[dict[int, Any], int]:
     """A structure's fields by number, and where it ends; texts and lists of other than structures are None."""
-    if depth > DEEPEST:
+    if depth > DEEPEST_NESTING:
         raise ValueError("what it says is nested too deep")
     fields: dict[int, Any] = {}
     number = 0

@@ -34,7 +34,7 @@ MOST_MANIFEST = 4 << 20
 MOST_COLUMNS = 1000
 MOST_BYTES = 8 << 30  # of all tables in memory
 ALWAYS_BYTES = 64 << 20  # whatever the file's size
-GROWTH = 32  # times the file's size; records of flights grow two- to threefold
+MOST_GROWTH = 32  # times the file's size; records of flights grow two- to threefold
 TEXTS = {"innovation": ("sensor", "component", "reason"), "events": ("source", "kind", "detail")}
 NUMBERED = {"innovation": ("component",)}  # texts that the paper's filter, whose components have no names, numbers
 WRONG = (
@@ -125,7 +125,7 @@ class _Bounded(io.FileIO):
 
 def _allowed(size: int) -> int:
     """Bytes in memory that a file of so many bytes may become."""
-    return min(MOST_BYTES, max(ALWAYS_BYTES, GROWTH * size))
+    return min(MOST_BYTES, max(ALWAYS_BYTES, MOST_GROWTH * size))
 
 
 def _checked_members(bundle: zipfile.ZipFile, size: int) -> list[str]:

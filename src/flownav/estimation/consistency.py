@@ -1,8 +1,27 @@
-"""How far the truth lies from what the filter says, in units of what it states."""
+"""A lane's covariance as a matrix and back, for Python's callers; how far the truth lies, in stated units."""
+
+import numpy as np
+from numpy.typing import NDArray
 
 from flownav.core.compile import Lanes, Work, equation
-from flownav.estimation.covariance import covariance_of
+from flownav.estimation.covariance import at, covariance_of
 from flownav.estimation.states import SCRATCH, STATE
+
+
+def unpack(work: NDArray[np.float64], lanes: Lanes, lane: int, n: int) -> NDArray[np.float64]:
+    """P of a lane, (n, n)."""
+    column, row = np.tril_indices(n)
+    packed = work[at(0, 0) * len(lanes) + lane :: len(lanes)][: len(row)]
+    full = np.zeros((n, n), work.dtype)
+    full[row, column] = full[column, row] = packed
+    return full
+
+
+def pack(work: NDArray[np.float64], lanes: Lanes, lane: int, n: int, covariance: NDArray[np.float64]) -> None:
+    """Put a symmetric P, (n, n), into a lane."""
+    column, row = np.tril_indices(n)
+    work[at(0, 0) * len(lanes) + lane :: len(lanes)][: len(row)] = covariance[row, column]
+
 
 SCORED = 6
 Six = tuple[float, float, float, float, float, float]

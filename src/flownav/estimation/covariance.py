@@ -9,7 +9,6 @@ noise is the joint update and inverts nothing. A lane that is not offered a read
 from typing import cast
 
 from flownav.core.compile import Lanes, Work, equation, procedure
-from flownav.estimation.attitude_error import fold_attitude
 from flownav.estimation.states import (
     ACCEPTED,
     COEFFICIENT,
@@ -33,6 +32,7 @@ from flownav.estimation.states import (
     STATES,
     STATES_WITH_LAG,
     TEST_RATIO,
+    fold_attitude,
 )
 
 LARGEST_VARIANCE = 1e30  # chosen: no reading is so poor, and its square is still finite

@@ -15,7 +15,7 @@ from flownav.core.frames import Rotation
 from flownav.estimation.covariance import columns_of
 from flownav.estimation.error_models import FilterSettings, discretised
 from flownav.estimation.law import step
-from flownav.estimation.laws.geometry import along_axis, cross, lens_range
+from flownav.estimation.laws import along_axis, cross, lens_range
 from flownav.estimation.motion import predict
 from flownav.estimation.named import Attitude, BodyRate, Height, Tilt, VelocityNed, rotation_by
 from flownav.estimation.states import STATES_WITH_LAG

@@ -1,9 +1,10 @@
 """Every format by name: where its file or folder goes, and who writes it."""
 
+from importlib import import_module
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.record import Record
 from flownav.export.trajectory import FRAMES
 
@@ -11,7 +12,12 @@ SUFFIXES = {
     "mcap": ".mcap", "foxglove": ".mcap", "tum": ".tum", "euroc": ".csv", "ulog": ".ulg", "kml": ".kml", "gpx": ".gpx",
 }  # fmt: skip
 FOLDERS = {"parquet": "_parquet", "csv": "_csv"}
-FORMATS = ("mcap", "foxglove", "tum", "euroc", "parquet", "csv", "ulog", "kml", "gpx")
+WRITERS = {  # by format: module and function
+    "mcap": ("mcap_file", "write_mcap"), "foxglove": ("mcap_file", "write_foxglove"), "tum": ("paths", "write_poses"),
+    "euroc": ("paths", "write_poses"), "parquet": ("trajectory", "write_parquet"), "csv": ("trajectory", "write_csv"),
+    "ulog": ("ulog_file", "write_ulog"), "kml": ("paths", "write_earth"), "gpx": ("paths", "write_earth"),
+}  # fmt: skip
+FORMATS = tuple(WRITERS)
 FRAMED = ("tum", "euroc")
 ON_EARTH = ("kml", "gpx")
 
@@ -30,7 +36,7 @@ def destination(record: Path, to: str, out: Path | None) -> Path:
     under the record's name. InputError where `to` is no format.
     """
     if to not in FORMATS:
-        raise InputError(f"--to {to}: one of {', '.join(FORMATS)} is needed")
+        raise InputError(f"{arg('to')} {to}: one of {', '.join(FORMATS)} is needed")
     if to in FOLDERS:
         return out or record.with_name(record.stem + FOLDERS[to])
     suffix = SUFFIXES[to]
@@ -64,33 +70,14 @@ def export(
     nothing can be written there.
     """
     if frame is not None and frame not in FRAMES:
-        raise InputError(f"--frame {frame}: ned or enu is needed")
+        raise InputError(f"{arg('frame')} {frame}: ned or enu is needed")
     if frame is not None and to not in FRAMED:
-        raise InputError(f"--frame is for {' and '.join(FRAMED)}; mcap carries both frames, the others are NED")
+        raise InputError(f"{arg('frame')} is for {' and '.join(FRAMED)}; mcap carries both frames, the others are NED")
     if original is not None and to != "ulog":
-        raise InputError("--merge is for --to ulog")
+        raise InputError(f"{arg('original')} is for {arg('to')} ulog")
     if origin is not None and to not in ON_EARTH:
-        raise InputError(f"--origin is for {' and '.join(ON_EARTH)}")
-    if to in ON_EARTH:
-        from flownav.export.paths import write_earth
-
-        return Written(*write_earth(record, path, to, origin))
-    if to == "foxglove":
-        from flownav.export.mcap_file import write_foxglove
-
-        return Written(*write_foxglove(record, path))
-    if to in FRAMED:
-        from flownav.export.paths import write_poses
-
-        return Written(*write_poses(record, path, frame or "ned"))
-    if to in FOLDERS:
-        from flownav.export.tables import write_csv, write_parquet
-
-        return Written(*(write_csv if to == "csv" else write_parquet)(record, path))
-    if to == "mcap":
-        from flownav.export.mcap_file import write_mcap
-
-        return Written(*write_mcap(record, path))
-    from flownav.export.ulog_file import write_ulog
-
-    return Written(*write_ulog(record, path, original))
+        raise InputError(f"{arg('origin')} is for {' and '.join(ON_EARTH)}")
+    takes: dict[str, tuple[Any, ...]] = dict.fromkeys(ON_EARTH, (to, origin)) | dict.fromkeys(FRAMED, (frame or "ned",))
+    module, name = WRITERS[to]
+    write = getattr(import_module(f"flownav.export.{module}"), name)
+    return Written(*write(record, path, *(takes | {"ulog": (original,)}).get(to, ())))

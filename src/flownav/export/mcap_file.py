@@ -16,18 +16,29 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.guard import written_whole
 from flownav.core.record import Column, Record, Table
 from flownav.core.version import __version__
-from flownav.export.tables import Stamps, finite_rows, is_text, manifest_json, shift_needed_s, stamps, texts
-from flownav.export.trajectory import ENU_FROM_NED, Trajectory, error_table, trajectories
+from flownav.export.trajectory import (
+    ENU_FROM_NED,
+    Stamps,
+    Trajectory,
+    error_table,
+    finite_rows,
+    is_text,
+    manifest_json,
+    shift_needed_s,
+    stamps,
+    texts,
+    trajectories,
+)
 
 Schema = dict[str, Any]
 
 NUMBER: Schema = {"type": "number"}
 TEXT: Schema = {"type": "string"}
-NS = 1_000_000_000
+NS_PER_S = 1_000_000_000
 Row = dict[str, Any]
 LAYOUT = "foxglove_layout.json"
 Node = str | dict[str, Any]
@@ -45,15 +56,9 @@ POSE_IN_FRAME = _object(
     {"timestamp": TIME, "frame_id": TEXT, "pose": _object({"position": VECTOR, "orientation": QUATERNION})},
     "foxglove.PoseInFrame",
 )
+TRANSFORM = ("timestamp", "parent_frame_id", "child_frame_id", "translation", "rotation")
 FRAME_TRANSFORM = _object(
-    {
-        "timestamp": TIME,
-        "parent_frame_id": TEXT,
-        "child_frame_id": TEXT,
-        "translation": VECTOR,
-        "rotation": QUATERNION,
-    },
-    "foxglove.FrameTransform",
+    dict(zip(TRANSFORM, (TIME, TEXT, TEXT, VECTOR, QUATERNION), strict=True)), "foxglove.FrameTransform"
 )
 _TYPES = {"f": "number", "i": "integer", "u": "integer", "b": "boolean"}
 
@@ -81,14 +86,14 @@ def write_mcap(record: Record, path: Path) -> tuple[list[Path], list[str]]:
     try:
         from mcap.writer import Writer
     except ImportError as error:
-        raise InputError("--to mcap needs the package mcap: pip install 'flownav[mcap]'") from error
+        raise InputError(f"{arg('to')} mcap needs the package mcap: pip install 'flownav[mcap]'") from error
     shift_s = shift_needed_s(record)
     paths = trajectories(record)
     channels, notes = [], [note for one in paths for note in one.notes]
     if shift_s:
         notes.append(f"all times are {shift_s:g} s later than in the record: the format has no negative time")
     for one in paths:
-        channels += _pose_channels(one, stamps(one.t_s, NS, shift_s))
+        channels += _pose_channels(one, stamps(one.t_s, NS_PER_S, shift_s))
     channels.append(_earth(channels[0].time_ns[:1]))
     errors = error_table(record, paths)
     for name, table in {**record.tables, **({} if errors is None else {"error": errors})}.items():
@@ -96,7 +101,7 @@ def write_mcap(record: Record, path: Path) -> tuple[list[Path], list[str]]:
         if len(rows) < len(table["t_s"]):
             notes.append(f"{name}: rows without a time left out: {len(table['t_s']) - len(rows)}")
         kept = {column: np.asarray(values)[rows] for column, values in table.items()}
-        time_ns = stamps(kept["t_s"], NS, shift_s)
+        time_ns = stamps(kept["t_s"], NS_PER_S, shift_s)
         channels.append(Channel(f"/{name}", table_schema(name, kept), time_ns, _rows(kept)))
     with written_whole(path) as temporary, temporary.open("wb") as stream:
         writer = Writer(stream)
@@ -156,18 +161,12 @@ def _earth(time_ns: Stamps) -> Channel:
     return Channel("/tf", FRAME_TRANSFORM, time_ns, iter(rows))
 
 
-def _transform(time: Row, parent: str, child: str, translation: Row, rotation: Row) -> Row:
-    return {
-        "timestamp": time,
-        "parent_frame_id": parent,
-        "child_frame_id": child,
-        "translation": translation,
-        "rotation": rotation,
-    }
+def _transform(*values: Row | str) -> Row:
+    return dict(zip(TRANSFORM, values, strict=True))
 
 
 def _time(time_ns: int) -> Row:
-    return {"sec": time_ns // NS, "nsec": time_ns % NS}
+    return {"sec": time_ns // NS_PER_S, "nsec": time_ns % NS_PER_S}
 
 
 def _rows(table: Table) -> Iterator[Row]:

@@ -18,12 +18,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.guard import written_whole
 from flownav.core.measurement import Array
 from flownav.core.record import POSITION_NED, Record
-from flownav.export.tables import stamps
-from flownav.export.trajectory import Trajectory, trajectories
+from flownav.export.trajectory import Trajectory, stamps, trajectories
 
 AXES = {"ned": "earth NED, body FRD", "enu": "earth ENU, body FLU"}
 EUROC_POSE = (
@@ -101,9 +100,11 @@ def origin_from(text: str) -> Origin:
     try:
         latitude, longitude, altitude = map(float, parts)
     except ValueError:
-        raise InputError(f"--origin {text}: LAT,LON,ALT is needed, in degrees and metres: 47.3977,8.5456,488") from None
+        raise InputError(
+            f"{arg('origin')} {text}: LAT,LON,ALT is needed, in degrees and metres: 47.3977,8.5456,488"
+        ) from None
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0 and abs(altitude) < MOST_ALTITUDE_M):
-        raise InputError(f"--origin {text}: latitude to 90, longitude to 180 degrees, altitude in metres")
+        raise InputError(f"{arg('origin')} {text}: latitude to 90, longitude to 180 degrees, altitude in metres")
     return latitude, longitude, altitude
 
 
@@ -113,8 +114,8 @@ def origin_of(record: Record) -> Origin:
     stated = parameters.get("origin_lat_lon_deg_alt_m") if isinstance(parameters, dict) else None
     if not isinstance(stated, list | tuple) or len(stated) != 3:
         raise InputError(
-            "the record does not say where on earth its origin is (simulated, or without GPS); give --origin "
-            "LAT,LON,ALT, in degrees and metres"
+            "the record does not say where on earth its origin is (simulated, or without GPS); "
+            f"give {arg('origin')} LAT,LON,ALT, in degrees and metres"
         )
     return origin_from(",".join(map(str, stated)))
 

@@ -11,21 +11,20 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.guard import written_whole
 from flownav.core.provenance import hash_of
 from flownav.core.record import Record
 from flownav.core.version import __version__
 from flownav.export import ulog_topics as ulog
-from flownav.export.tables import finite_rows, is_text, shift_needed_s
-from flownav.export.trajectory import trajectories
+from flownav.export.trajectory import finite_rows, is_text, shift_needed_s, trajectories
 
 DEFINITIONS = frozenset(b"BFIMPQ")
 FLAGS_SIZE, INCOMPATIBLE_AT, OFFSETS_AT = 40, 8, 16
 OFFSETS = struct.Struct("<3Q")
 CLOCKED = b"uint64_t timestamp;"
 NAMED = {"estimate": "", "truth": "_groundtruth"}  # what PX4 calls the estimate and the truth of a simulation
-APART = ("estimate", "smoothed", "truth", "autopilot", "innovation", "events")
+WRITTEN_APART = ("estimate", "smoothed", "truth", "autopilot", "innovation", "events")
 
 
 class Flags(NamedTuple):
@@ -123,7 +122,7 @@ def _check(layout: Layout, name: str, topics: list[ulog.Topic]) -> None:
     taken = sorted(layout.formats & {topic.name for topic in topics})
     if taken:
         raise InputError(f"{name}: holds {taken[0]} already; merge into the log as the vehicle wrote it")
-    if layout.next_number + len(topics) > ulog.LARGEST:
+    if layout.next_number + len(topics) > ulog.LARGEST_UINT16:
         raise InputError(f"{name}: no message numbers are left for {len(topics)} more topics")
     ours = [int(t) for topic in topics for t in (topic.time_us[:1], topic.time_us[-1:]) for t in t]
     theirs = [t for t, _ in layout.clock]
@@ -207,7 +206,7 @@ def _all_of(record: Record) -> Contents:
             if path.oriented:
                 topics.append(ulog.attitude_topic(path, f"vehicle_attitude{NAMED[path.name]}", shift_s))
     for name, table in record.tables.items():
-        if name not in APART:
+        if name not in WRITTEN_APART:
             topics.append(ulog.table_topic(name, table, shift_s))
             text = [column for column in table if is_text(table[column])]
             if text:
@@ -237,7 +236,9 @@ def _clock_start_s(record: Record, original: Path) -> float:
     """What the original's clock showed at time 0 of the record."""
     start_s = record.manifest.get("clock_start_s")
     if start_s is None:
-        raise InputError(f"--merge {original}: the record does not say when its time began there; replay the log again")
+        raise InputError(
+            f"{arg('original')} {original}: the record does not say when its time began there; replay the log again"
+        )
     return float(start_s)
 
 
@@ -259,9 +260,11 @@ def _from_zero_on(contents: Contents) -> Contents:
 def _read_original(record: Record, original: Path) -> bytes:
     """The log's bytes. InputError where it cannot be read or is not among the record's inputs."""
     if not original.is_file():
-        raise InputError(f"--merge {original}: no such file; give the log that was replayed")
+        raise InputError(f"{arg('original')} {original}: no such file; give the log that was replayed")
     inputs = record.manifest.get("provenance", {}).get("inputs", {}).values()
     hashes = {value["sha256"] if isinstance(value, dict) else value for value in inputs}
     if hash_of(original) not in hashes:
-        raise InputError(f"--merge {original}: the record was not replayed from this file (its SHA-256 differs)")
+        raise InputError(
+            f"{arg('original')} {original}: the record was not replayed from this file (its SHA-256 differs)"
+        )
     return original.read_bytes()

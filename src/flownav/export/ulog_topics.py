@@ -17,19 +17,18 @@ from numpy.typing import NDArray
 from flownav.core.frames import heading_from_quaternion
 from flownav.core.record import STANDARD_DEVIATIONS as STD
 from flownav.core.record import Record, Table
-from flownav.export.tables import Stamps, finite_rows, is_text, stamps
-from flownav.export.trajectory import Trajectory
+from flownav.export.trajectory import Stamps, Trajectory, finite_rows, is_text, stamps
 
 MAGIC = b"ULog\x01\x12\x35"
 HEADER_SIZE = 16
 SYNC = b"\x08\x00S\x2f\x73\x13\x20\x25\x0c\xbb\x12"
 KNOWN = frozenset(b"BFIMPQARDLCSO")
-LARGEST = 0xFFFF
+LARGEST_UINT16 = 0xFFFF
 _TYPES = {"float": "<f4", "double": "<f8", "uint64_t": "<u8", "uint32_t": "<u4", "uint8_t": "u1", "int8_t": "i1"}
 _TYPES["bool"] = "u1"
-US = 1e6
+US_PER_S = 1e6
 NUMBERS = ("observation", "observation_variance", "innovation", "innovation_variance", "test_ratio")
-DOWNWARD = 25  # MAV_SENSOR_ROTATION_PITCH_270
+DOWNWARD_ROTATION = 25  # MAV_SENSOR_ROTATION_PITCH_270
 Array = NDArray[Any]
 
 
@@ -66,8 +65,8 @@ class Found(NamedTuple):
 
 def message(kind: str, body: bytes) -> bytes:
     """A message of a type with its header. ValueError where the body is too long for one."""
-    if len(body) > LARGEST:
-        raise ValueError(f"a ULog message holds {LARGEST} bytes, not {len(body)}")
+    if len(body) > LARGEST_UINT16:
+        raise ValueError(f"a ULog message holds {LARGEST_UINT16} bytes, not {len(body)}")
     return struct.pack("<HB", len(body), ord(kind)) + body
 
 
@@ -156,13 +155,13 @@ def our_topic(record: Record, path: Trajectory, shift_s: float) -> Topic:
     if path.oriented:
         fields.append(Field("double", "q", path.quaternion))
     fields += [Field("double", name, np.asarray(table[name], float)[path.row]) for name in STD if name in table]
-    return Topic(f"flownav_{path.name}", stamps(path.t_s, US, shift_s), fields)
+    return Topic(f"flownav_{path.name}", stamps(path.t_s, US_PER_S, shift_s), fields)
 
 
 def position_topic(record: Record, path: Trajectory, name: str, shift_s: float) -> Topic:
     """A path as PX4's VehicleLocalPosition; its velocity is not valid where no attitude was recorded to turn it by."""
     table = record.tables[path.name]
-    time_us = stamps(path.t_s, US, shift_s)
+    time_us = stamps(path.t_s, US_PER_S, shift_s)
     count = len(time_us)
     velocity = path.velocity_m_s if path.velocity_m_s is not None else np.full((count, 3), np.nan)
     moving = np.isfinite(velocity)
@@ -186,7 +185,7 @@ def position_topic(record: Record, path: Trajectory, name: str, shift_s: float) 
 
 def attitude_topic(path: Trajectory, name: str, shift_s: float) -> Topic:
     """A path as PX4's VehicleAttitude."""
-    time_us = stamps(path.t_s, US, shift_s)
+    time_us = stamps(path.t_s, US_PER_S, shift_s)
     return Topic(name, time_us, [Field("uint64_t", "timestamp_sample", time_us), Field("float", "q", path.quaternion)])
 
 
@@ -194,7 +193,7 @@ def table_topic(name: str, table: Table, shift_s: float) -> Topic:
     """A measurement table as PX4's topic where there is one, else its numbers under their own names."""
     rows = finite_rows(np.asarray(table["t_s"], float))
     kept = {key: np.asarray(column)[rows] for key, column in table.items()}
-    time_us = stamps(kept["t_s"], US, shift_s)
+    time_us = stamps(kept["t_s"], US_PER_S, shift_s)
     if name in PX4 and set(PX4_NEEDS[name]) <= kept.keys():
         topic, fields = PX4[name](kept)
         return Topic(topic, time_us, fields)
@@ -220,14 +219,14 @@ def innovation_topics(table: Table, shift_s: float) -> tuple[list[Topic], list[s
     for name in dict.fromkeys(whose.tolist()):
         of = whose == name
         fields = [column._replace(values=column.values[of]) for column in columns]
-        topics.append(Topic(f"flownav_innovation_{_spelled(name)}", stamps(kept["t_s"][of], US, shift_s), fields))
+        topics.append(Topic(f"flownav_innovation_{_spelled(name)}", stamps(kept["t_s"][of], US_PER_S, shift_s), fields))
     return topics, reasons
 
 
 def event_strings(table: Table, shift_s: float) -> list[Stamped]:
     """Events as logged strings, warnings at their level."""
     rows = finite_rows(np.asarray(table["t_s"], float))
-    times: Stamps = stamps(np.asarray(table["t_s"], float)[rows], US, shift_s)
+    times: Stamps = stamps(np.asarray(table["t_s"], float)[rows], US_PER_S, shift_s)
     strings = []
     for row, time_us in zip(rows, times.tolist(), strict=True):
         source, kind, detail = (str(table[key][row]) if key in table else "" for key in ("source", "kind", "detail"))
@@ -244,15 +243,15 @@ def _distance_sensor(table: Table) -> tuple[str, list[Field]]:
     return "distance_sensor", [
         Field("float", "current_distance", table["range_m"]),
         Field("int8_t", "signal_quality", quality),
-        Field("uint8_t", "orientation", np.full(count, DOWNWARD)),
+        Field("uint8_t", "orientation", np.full(count, DOWNWARD_ROTATION)),
     ]
 
 
 def _optical_flow(table: Table) -> tuple[str, list[Field]]:
     """Rates times one timespan, the median interval between readings: PX4 states angles over a timespan."""
     intervals = np.diff(table["t_s"])
-    span_us = float(np.rint(US * np.median(intervals))) if len(intervals) else US
-    span_s = max(span_us, 1.0) / US
+    span_us = float(np.rint(US_PER_S * np.median(intervals))) if len(intervals) else US_PER_S
+    span_s = max(span_us, 1.0) / US_PER_S
     flow, gyro = ([table[f"{what}_{axis}_rad_s"] * span_s for axis in "xy"] for what in ("flow", "gyro"))
     count = len(table["t_s"])
     return "vehicle_optical_flow", [

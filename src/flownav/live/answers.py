@@ -22,7 +22,7 @@ from flownav.navigation.place import SEEN
 
 LONGEST_AHEAD_S = 2.0  # chosen: twice the longest horizon, within the inertial readings that are kept
 UNFUSED = "unfused"  # a reason that the session finds (horizon.Serving)
-INVALID = 2.0  # the flag of `memory.AidMemory`
+INVALID_FLAG = 2.0  # the flag of `memory.AidMemory`
 WITHHELD = {
     "no_vehicle": "no autopilot's HEARTBEAT is heard",
     "listening": "the vehicle is being listened to",
@@ -39,7 +39,7 @@ WITHHELD = {
     "nothing_asked": "--send none",
 }
 OWN_SYSTEM = 1  # until the vehicle's is known, which we then are of
-STEEPEST = 0.1  # cosine of the steepest sight of the pad that is told, 84 deg: chosen, beyond any camera's view
+STEEPEST_COSINE = 0.1  # cosine of the steepest sight of the pad that is told, 84 deg: chosen, beyond any camera's view
 
 
 def why_withheld(on: Running | None, t_s: float, newest_s: float, limits: Limits) -> str:
@@ -52,7 +52,7 @@ def why_withheld(on: Running | None, t_s: float, newest_s: float, limits: Limits
     imu_stale = told.equipment.use_imu and not on.clock_s - imu.read_s <= told.imu.imu_stale_s
     if imu_stale or not t_s - newest_s <= limits.age_s or not t_s - on.clock_s <= LONGEST_AHEAD_S:
         return "stale"
-    if aid.flag >= INVALID or on.clock_s - aid.aided_s > told.aid.invalid_s:
+    if aid.flag >= INVALID_FLAG or on.clock_s - aid.aided_s > told.aid.invalid_s:
         return "position_invalid"
     if t_s - aid.aided_s > limits.dead_reckoning_s:
         return "dead_reckoning"
@@ -186,7 +186,7 @@ class Answers:
         north, east, down = (place[i] - estimate.pos_ned_m[i] for i in range(3))
         x, y, z = to_body(rotation_from_quaternion(*estimate.quaternion), north, east, down)
         distance_m = math.sqrt(x * x + y * y + z * z)
-        if not z > STEEPEST * distance_m:
+        if not z > STEEPEST_COSINE * distance_m:
             return []
         in_earth = place if vehicle.make == PX4 else None
         return [say.landing_target(self._mav, estimate.time_us, x / z, y / z, distance_m, pad_ned_m=in_earth)]

@@ -11,7 +11,7 @@ from flownav.core.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sen
 from flownav.estimation.states import POSITION, STATE
 from flownav.live.horizon import Waiting
 from flownav.live.options import Options
-from flownav.logs.frames import attitude_rates, mean_over
+from flownav.logs.log import attitude_rates, mean_over
 from flownav.logs.mavlink.messages import TrueState
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import Running, run, start_navigator
@@ -24,7 +24,7 @@ from flownav.navigation.told import Equipment
 from flownav.sensors.datasheet import UNTURNED, in_vehicle_axes
 
 NAN = float("nan")
-BATCH = 64  # readings at a time, 6 ms of them; all at once, the first estimates stop the loop for 130 ms
+BATCH_READINGS = 64  # readings at a time, 6 ms of them; all at once, the first estimates stop the loop for 130 ms
 KEPT_IMU = 512  # two seconds at 250 Hz, more than the horizon and an exposure
 KEPT_ATTITUDES = 128  # more than two seconds at 50 Hz
 FLOW = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
@@ -72,9 +72,9 @@ class Filtering:
         self._witness, self._row_of_imu = Witness(), np.zeros((1, 7))
         self._attitude: deque[tuple[float, ...]] = deque(maxlen=KEPT_ATTITUDES)
         most = max(COMPONENTS.values())
-        self._tape = empty_tape(BATCH + 2, most * BATCH, 8 * BATCH + 8)
-        self._room = _empty_queue(BATCH)
-        self._arrival_s = np.zeros(BATCH)
+        self._tape = empty_tape(BATCH_READINGS + 2, most * BATCH_READINGS, 8 * BATCH_READINGS + 8)
+        self._room = _empty_queue(BATCH_READINGS)
+        self._arrival_s = np.zeros(BATCH_READINGS)
 
     def heard(self, waiting: Waiting) -> None:
         """A reading has arrived: IMU and attitude are kept for the flow's exposure and for the way from then to now."""
@@ -110,7 +110,7 @@ class Filtering:
         self._attitude.clear()
 
     def feed(self, released: list[Waiting]) -> Outcome:
-        """At most BATCH readings, in the order of their instants."""
+        """At most BATCH_READINGS readings, in the order of their instants."""
         on = self.running
         assert on is not None
         room = self._room

@@ -20,7 +20,7 @@ SILENT_S = 2.0  # a source that says nothing for so long gives way
 # Chosen, and held by test_live_recordings: ArduPilot repeats a fix of 5 Hz at 10 Hz, its first copy up to 0.1 s old;
 # with a horizon that did not follow it, all fixes came too late on most starts.
 WINDOW_S = 5.0
-WINDOWS = 4  # a stream that comes in time again is waited for so many windows longer
+PATIENT_WINDOWS = 4  # a stream that comes in time again is waited for so many windows longer
 MOST_WAITING = 8192  # chosen: ten seconds of a busy link; a flood is dropped and counted (test_live_safety)
 WATCHED = (*HORIZONTAL, Sensor.RANGE)
 DOWNWARD = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.RANGE)  # on the ground they need not serve
@@ -94,7 +94,7 @@ class Lags:
         lag_s = self._newest_s - instant_s
         if lag_s > self._most_s:
             return  # nobody waits for so long; it comes too late, and is counted so
-        windows = self._windows.setdefault(sensor, deque(maxlen=WINDOWS))
+        windows = self._windows.setdefault(sensor, deque(maxlen=PATIENT_WINDOWS))
         if not windows or self._newest_s - windows[-1][0] >= WINDOW_S:
             windows.append((self._newest_s, lag_s))
         elif lag_s > windows[-1][1]:
@@ -113,7 +113,7 @@ class Lags:
     @property
     def by_sensor(self) -> dict[Sensor, float]:
         """The lag to wait for, by sensor [s]; a sensor that has not spoken for all windows is not waited for."""
-        oldest_s = self._newest_s - WINDOWS * WINDOW_S
+        oldest_s = self._newest_s - PATIENT_WINDOWS * WINDOW_S
         return {
             sensor: max(lag_s for _, lag_s in windows)
             for sensor, windows in self._windows.items()

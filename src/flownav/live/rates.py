@@ -29,17 +29,17 @@ STREAMS = {
 }
 # Of the line; the rest is for HEARTBEAT, TIMESYNC, texts, answers and what others ask of the vehicle. Asked for
 # everything, 115200 baud lose 67 frames a second and readings are 109 ms old; with this none, and 15 (live.md).
-SHARE = 0.8
-OVERFULL = 0.95  # of the line: more arrives than was planned, and the autopilot's buffer fills; full lines are at 98 %
+LINE_SHARE = 0.8
+OVERFULL_SHARE = 0.95  # of the line: more comes than was planned, the autopilot's buffer fills; full lines are at 98 %
 LOOK_S = 5.0  # chosen
-SIGNATURE = 13
+SIGNATURE_BYTES = 13
 # bytes of a MAVLink 2 frame, as ArduPilot and PX4 fill them (zeros at a payload's end are not sent)
-FRAME = {
+FRAME_BYTES = {
     "RAW_IMU": 41, "HIGHRES_IMU": 75, "OPTICAL_FLOW": 46, "OPTICAL_FLOW_RAD": 56, "ATTITUDE_QUATERNION": 44,
     "DISTANCE_SENSOR": 51, "GPS_RAW_INT": 64, "SCALED_PRESSURE": 28, "EXTENDED_SYS_STATE": 14, "SYSTEM_TIME": 24,
     "SIM_STATE": 96, "HIL_STATE_QUATERNION": 76,
 }  # fmt: skip
-ESTIMATE = {"odometry": 244, "vision": 129 + 69, "landing-target": 72, "none": 0}
+ESTIMATE_BYTES = {"odometry": 244, "vision": 129 + 69, "landing-target": 72, "none": 0}
 ABSENT = {True: (), False: ("OPTICAL_FLOW",)}  # by ArduPilot or not: asked for in case, and takes no part of the line
 TRUTHS = ("SIM_STATE", "HIL_STATE_QUATERNION")
 # in this order: messages, and the rate that they come down to [Hz]
@@ -82,9 +82,9 @@ class Plan(NamedTuple):
 
 def bytes_of(streams: Streams, *, ardupilot: bool, signed: bool = False) -> float:
     """What streams take of a line [bytes/s]."""
-    extra = SIGNATURE if signed else 0
+    extra = SIGNATURE_BYTES if signed else 0
     return sum(
-        rate_hz * (FRAME.get(name, 0) + extra)
+        rate_hz * (FRAME_BYTES.get(name, 0) + extra)
         for name, (_, rate_hz) in streams.items()
         if name not in ABSENT[ardupilot]
     )
@@ -108,7 +108,7 @@ def plan(
     wanted = STREAMS[ardupilot] | (beside or {})
     if capacity_bytes_s is None:
         return Plan(wanted, bytes_of(wanted, ardupilot=ardupilot, signed=signed), most_hz)
-    most_bytes_s = SHARE * spare * capacity_bytes_s
+    most_bytes_s = LINE_SHARE * spare * capacity_bytes_s
 
     def taken(steps: list[int]) -> tuple[Streams, float]:
         streams = dict(wanted)
@@ -124,8 +124,8 @@ def plan(
         fewer = [other for other in steps if other != step]
         steps = fewer if taken(fewer)[1] <= most_bytes_s else steps
     streams, bytes_s = taken(steps)
-    frame = ESTIMATE[send] + (SIGNATURE if signed else 0)
-    estimate_hz = min(SHARE * capacity_bytes_s / frame, most_hz) if ESTIMATE[send] else float("inf")
+    frame = ESTIMATE_BYTES[send] + (SIGNATURE_BYTES if signed else 0)
+    estimate_hz = min(LINE_SHARE * capacity_bytes_s / frame, most_hz) if ESTIMATE_BYTES[send] else float("inf")
     lacks = ["the least rates of the sensors"] if bytes_s > most_bytes_s else []
     lacks += (
         [f"the {PX4_LEAST_HZ:.0f} estimates/s that PX4 fuses"] if make == PX4 and estimate_hz < PX4_LEAST_HZ else []
@@ -175,7 +175,7 @@ class Rates:
             return False
         filled = self._bytes / (now_s - self._since_s) / self.capacity_bytes_s
         self._bytes, self._since_s = 0, now_s
-        if filled < OVERFULL or self._make < 0 or self._spare < 0.3:
+        if filled < OVERFULL_SHARE or self._make < 0 or self._spare < 0.3:
             return False
         self._spare *= 0.8
         return True

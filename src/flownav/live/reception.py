@@ -9,7 +9,7 @@ from collections import Counter, deque
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.logs.mavlink import clock as stamps
 from flownav.logs.mavlink.framing import INVALID_AUTOPILOT, Message, StreamFrames, coder, dialect
 from flownav.logs.mavlink.signing import SignatureCheck
@@ -24,7 +24,7 @@ MOST_UNSEEN_S = 0.1  # of age when it is sent that a stamped message may have, b
 COARSE_S = 0.02  # of stamps in milliseconds, and of crystals that drift for FRESH_S
 LEAP_S = 0.3  # a stamp that is so much earlier than any before on the link: the clock leapt, or the stamp is wrong
 STEP_S = 1.0  # TIMESYNC offsets that differ by more are of a vehicle that began anew
-REMEMBERED = 16
+EXCHANGES_KEPT = 16
 FRESH_S = 20.0
 WINDOW_S = 0.5
 
@@ -53,9 +53,9 @@ def accepted_of(text: str) -> Accepted:
     """MESSAGE=SYSTEM.COMPONENT, e.g. LANDING_TARGET=1.191; 0 stands for any. InputError where it is not that."""
     found = re.fullmatch(r"(?P<name>[A-Z][A-Z0-9_]*)=(?P<system>\d{1,3})\.(?P<component>\d{1,3})", text)
     if found is None or max(int(found["system"]), int(found["component"])) > 255:
-        raise InputError(f"--accept {text}: MESSAGE=SYSTEM.COMPONENT is needed, e.g. LANDING_TARGET=1.191")
+        raise InputError(f"{arg('accept')} {text}: MESSAGE=SYSTEM.COMPONENT is needed, e.g. LANDING_TARGET=1.191")
     if not hasattr(dialect(), f"MAVLINK_MSG_ID_{found['name']}"):
-        raise InputError(f"--accept {text}: MAVLink has no message {found['name']}")
+        raise InputError(f"{arg('accept')} {text}: MAVLink has no message {found['name']}")
     return Accepted(found["name"], int(found["system"]) or None, int(found["component"]) or None)
 
 
@@ -197,7 +197,7 @@ class VehicleClock:
     def __init__(self, system: int, component: int) -> None:
         self._state = stamps.ClockState((system, component, "boot"))
         self._leads: deque[tuple[float, float]] = deque(maxlen=2)  # since when, and session time less ours [s]
-        self._exchanges: deque[Exchange] = deque(maxlen=REMEMBERED)
+        self._exchanges: deque[Exchange] = deque(maxlen=EXCHANGES_KEPT)
         self._leaping, self._leap_s = 0, NAN  # stamps in a row that are ahead of our clock, and by how much
         self._told_s = self._doubted_s = NAN  # offset that TIMESYNC tells, and one that differs by a step
         self.counts: Counter[str] = Counter()

@@ -75,7 +75,7 @@ class Recorder(Keeper):
             os.close(self._file)
             with suppress(OSError):
                 self.journal.unlink()
-            raise InputError(f"{path}: cannot be written ({error.strerror}); give another --record") from error
+            raise InputError(f"{path}: cannot be written ({error.strerror}); give another name") from error
 
     @property
     def reason(self) -> str:

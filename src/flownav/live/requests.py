@@ -10,10 +10,9 @@ from typing import Any, NamedTuple
 
 from flownav.live.rates import Rates, Streams
 from flownav.live.reception import Vehicle
-from flownav.logs.mavlink.framing import ARDUPILOT, PX4, Message
-from flownav.logs.mavlink.parameters import name_of, request_read
+from flownav.logs.mavlink.framing import ARDUPILOT, PX4, Message, name_of, request_read
 
-HIL = 32  # MAV_MODE_FLAG_HIL_ENABLED
+HIL_FLAG = 32  # MAV_MODE_FLAG_HIL_ENABLED
 OF_A_SIMULATOR = "SIM_SPEEDUP"
 MOST_QUESTIONS, AGAIN_S = 4, 2.0
 SET_MESSAGE_INTERVAL, REQUEST_MESSAGE = 511, 512  # MAV_CMD
@@ -23,7 +22,7 @@ ACCEPTED, TEMPORARILY_REJECTED, IN_PROGRESS = 0, 1, 5  # MAV_RESULT
 ANSWER_S = 0.5
 TRIES = 3
 SILENT_S = 2.0  # a stream that has said nothing for so long is asked for again
-PERIODS = 5.0  # and for so many of its periods
+SILENT_PERIODS = 5.0  # and for so many of its periods
 MOST_PATIENCE_S = 30.0  # a stream that has never come is asked for ever more seldom, down to this
 ORIGIN, GLOBAL_ORIGIN = "GPS_GLOBAL_ORIGIN", 49  # told when it is asked for, and when it is set
 
@@ -58,7 +57,7 @@ class Simulator:
             self.truth = TRUTHS[name]
         elif name == "PARAM_VALUE" and name_of(message) == OF_A_SIMULATOR:
             self.truth = SIM_STATE
-        elif name == "HEARTBEAT" and vehicle.make == PX4 and message.base_mode & HIL:
+        elif name == "HEARTBEAT" and vehicle.make == PX4 and message.base_mode & HIL_FLAG:
             self.truth = HIL_STATE
         return self.truth
 
@@ -131,7 +130,7 @@ class Requests:
         self._spoke_s = now_s
         stream = self._streams.get(name)
         if stream is not None:
-            wait_s = max(SILENT_S, PERIODS / stream.rate_hz) if stream.rate_hz else float("inf")
+            wait_s = max(SILENT_S, SILENT_PERIODS / stream.rate_hz) if stream.rate_hz else float("inf")
             self._streams[name] = stream._replace(heard_s=now_s, wait_s=wait_s)
 
     def due(self, mav: Any, vehicle: Vehicle, now_s: float) -> Message | None:

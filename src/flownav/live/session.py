@@ -9,7 +9,7 @@ from collections import Counter, deque
 
 from flownav.core.measurement import Sensor
 from flownav.live.answers import UNFUSED, WITHHELD, Answers, estimate_of, fault_of, why_withheld
-from flownav.live.filtering import BATCH, Filtering, Keeper
+from flownav.live.filtering import BATCH_READINGS, Filtering, Keeper
 from flownav.live.hearing import Hearing
 from flownav.live.horizon import Refused
 from flownav.live.options import Options
@@ -24,7 +24,7 @@ from flownav.navigation.feed import SLOWEST_IMU_HZ
 from flownav.navigation.reasons import HORIZONTAL
 from flownav.navigation.rows import InnovationRow
 
-SECOND = 1.0
+SECOND_S = 1.0
 SEND_EVERY_S = 0.02  # without flow, above EKF2's 30 Hz; with it, an estimate for each of its readings
 OUTRANKED = ("", "position_invalid", "dead_reckoning", "unprotected")  # what a sensor that does not serve may cause
 NAN = float("nan")
@@ -190,7 +190,7 @@ class Session:
         if not behind and (self.due or since_s >= SEND_EVERY_S) and since_s >= self.rates.estimate_every_s:
             hearing.flow_came, self._sent_s = False, now_s
             self._offer(t_s, now_s)
-        if now_s - self._second_s >= SECOND:
+        if now_s - self._second_s >= SECOND_S:
             self._second_s = now_s
             self._send(companion_heartbeat(self.answers.mav), now_s)
             self._send(self.answers.timesync(now_s), now_s)
@@ -201,7 +201,7 @@ class Session:
 
     def _feed(self, until_s: float) -> bool:
         """A batch: what was listened to for seconds must not hold up what arrives now. True where more is due."""
-        released = self.hearing.horizon.release(until_s, BATCH)
+        released = self.hearing.horizon.release(until_s, BATCH_READINGS)
         if released:
             outcome = self.filtering.feed(released)
             offered = [InnovationRow(*row) for row in outcome.innovation.tolist()]
@@ -209,7 +209,7 @@ class Session:
                 told = row.innovation, row.test_ratio, int(row.reason)
                 self.innovations[int(row.sensor), int(row.component)] = told
             self.hearing.serving.judged(offered)
-        return len(released) == BATCH
+        return len(released) == BATCH_READINGS
 
     def _watch(self, t_s: float) -> None:
         """Alarms that begin and end go into the record."""

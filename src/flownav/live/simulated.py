@@ -32,8 +32,8 @@ OF_SENSOR = {
     Sensor.FLOW_RATE: "OPTICAL_FLOW_RAD",
     Sensor.RANGE: "DISTANCE_SENSOR",
 }
-KEPT = 20_000  # estimates heard
-FRACTION = 0.9  # of an interval that must have passed: schedules jitter; chosen
+KEPT_ESTIMATES = 20_000  # estimates heard
+INTERVAL_FRACTION = 0.9  # of an interval that must have passed: schedules jitter; chosen
 
 
 class Due(NamedTuple):
@@ -55,7 +55,7 @@ class SimulatedVehicle:
         self._interval_s: dict[str, float] = {}
         self._last_s: dict[str, float] = {}
         self.counts: Counter[str] = Counter()
-        self.received: deque[tuple[float, Message]] = deque(maxlen=KEPT)
+        self.received: deque[tuple[float, Message]] = deque(maxlen=KEPT_ESTIMATES)
         truth = log.truth
         assert truth is not None
         self._truth_s = truth["t_s"]
@@ -103,7 +103,7 @@ class SimulatedVehicle:
         while self._due and self._due[0].t_s <= t_s:
             found = heapq.heappop(self._due)
             interval_s = self._interval_s.get(found.name, 0.0)
-            if found.t_s - self._last_s.get(found.name, -np.inf) < FRACTION * interval_s or interval_s < 0.0:
+            if found.t_s - self._last_s.get(found.name, -np.inf) < INTERVAL_FRACTION * interval_s or interval_s < 0.0:
                 continue
             self._last_s[found.name] = found.t_s
             message = self._message(found)

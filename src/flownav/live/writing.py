@@ -55,14 +55,14 @@ def claim(path: Path, *, force: bool) -> Place:
     another session records there, or nothing can be written.
     """
     if os.path.lexists(path) and not path.is_file():
-        raise InputError(f"{path}: it is there and no file; give another --record")
+        raise InputError(f"{path}: it is there and no file; give another name")
     why = ""
     for number in range(MOST_NUMBERS):
         record = numbered(path, number)
         journal = journal_of(record)
         if os.path.lexists(journal):
             if is_locked(journal):
-                raise InputError(f"{record}: another session is recording there; give another --record")
+                raise InputError(f"{record}: another session is recording there; give another name")
             why = why or f"{journal} is left by a session that was killed (`flownav recover {journal}`)"
         elif os.path.lexists(record) and not force:
             why = why or f"{record} is there already (--force replaces it)"
@@ -70,7 +70,7 @@ def claim(path: Path, *, force: bool) -> Place:
             file = _made(journal, record)
             if file is not None:
                 return Place(record, journal, file, f"{why}; this session records to {record}" if why else "")
-    raise InputError(f"{path}: it is there, and so are {MOST_NUMBERS} numbered beside it; give another --record")
+    raise InputError(f"{path}: it is there, and so are {MOST_NUMBERS} numbered beside it; give another name")
 
 
 def is_locked(journal: Path) -> bool:
@@ -96,7 +96,7 @@ def _made(journal: Path, record: Path) -> int | None:
     except FileExistsError:
         return None
     except OSError as error:
-        raise InputError(f"{record}: cannot be written ({error.strerror}); give another --record") from error
+        raise InputError(f"{record}: cannot be written ({error.strerror}); give another name") from error
     until_s = time.monotonic() + LOCK_WAIT_S
     while True:
         try:
@@ -112,7 +112,7 @@ def _made(journal: Path, record: Path) -> int | None:
         os.close(file)
         with suppress(OSError):
             journal.unlink()
-        raise InputError(f"{record}: cannot be written ({error.strerror}); give another --record") from error
+        raise InputError(f"{record}: cannot be written ({error.strerror}); give another name") from error
     return file
 
 

@@ -28,20 +28,19 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, Table
 from flownav.logs.assembly import MOST_BYTES, content_of, counted, pressure_altitude_m, sensor_stream, sha256_of
-from flownav.logs.frames import frd, ned_from_frd_of_nwu, state_table
-from flownav.logs.log import Log, absences_of
+from flownav.logs.log import Log, absences_of, frd, ned_from_frd_of_nwu, state_table
 from flownav.logs.plausible import of_one_clock
 
 MAGIC = 0xBC
 LETTERS = {"B": "u1", "b": "i1", "H": "u2", "h": "i2", "I": "u4", "i": "i4", "Q": "u8", "q": "i8", "e": "f2", "f": "f4"}
 CODES = {letter: np.dtype(f"<{kind}") for letter, kind in (LETTERS | {"d": "f8", "?": "?"}).items()}
 MOST_KINDS, MOST_VARIABLES, LONGEST_NAME = 256, 256, 80
-TIMES = {1: (np.dtype("<u4"), 1e-3), 2: (np.dtype("<u8"), 1e-6)}
+TIME_STAMPS = {1: (np.dtype("<u4"), 1e-3), 2: (np.dtype("<u8"), 1e-6)}
 COUNTS_PER_PIXEL, PIXELS, APERTURE_RAD = 10.0, 35.0, 0.71674
 RAD_PER_COUNT = APERTURE_RAD / (PIXELS * COUNTS_PER_PIXEL)
 READ_EVERY_S = 0.010
@@ -105,7 +104,7 @@ def read_blocks(path: Path) -> Blocks:
         notes.append(f"damaged at byte {stop}: {end - stop} bytes are left out")
     elif stop < end:
         notes.append(f"{end - stop} bytes at the end belong to no whole block and are left out")
-    unit_s = TIMES[version][1]
+    unit_s = TIME_STAMPS[version][1]
     found = []
     for number, kind in kinds.items():
         table = np.frombuffer(b"".join(rows[number]), kind.row)
@@ -116,7 +115,7 @@ def read_blocks(path: Path) -> Blocks:
 
 def looks_like(head: bytes) -> bool:
     """Whether a file's first bytes are those of such a log: magic, version, and a first kind with a sane name."""
-    if len(head) < 12 or head[0] != MAGIC or int.from_bytes(head[1:3], "little") not in TIMES:
+    if len(head) < 12 or head[0] != MAGIC or int.from_bytes(head[1:3], "little") not in TIME_STAMPS:
         return False
     count, name = int.from_bytes(head[3:5], "little"), head[7 : 7 + LONGEST_NAME].split(b"\0")[0]
     return 0 < count <= MOST_KINDS and len(name) > 0 and name.isascii() and name.decode().isprintable()
@@ -127,7 +126,7 @@ def _head(path: Path, content: bytes) -> tuple[int, dict[int, _Kind], int]:
     if len(content) < 5 or content[0] != MAGIC:
         raise InputError(f"{path}: no log of the micro SD deck (it begins with 0xBC)")
     version, count = struct.unpack_from("<HH", content, 1)
-    if version not in TIMES:
+    if version not in TIME_STAMPS:
         raise InputError(f"{path}: version {version} of the micro SD deck's log; 1 and 2 are known")
     if not 0 < count <= MOST_KINDS:
         raise InputError(f"{path}: a damaged head ({count} kinds of blocks); give another log")
@@ -141,7 +140,7 @@ def _head(path: Path, content: bytes) -> tuple[int, dict[int, _Kind], int]:
             place += 2
             if variables > MOST_VARIABLES:
                 raise ValueError(f"{variables} variables")
-            fields: list[tuple[str, Any]] = [("number", np.dtype("<u2")), ("time", TIMES[version][0])]
+            fields: list[tuple[str, Any]] = [("number", np.dtype("<u2")), ("time", TIME_STAMPS[version][0])]
             names = []
             for k in range(variables):
                 spelled, place = _name(content, place)
@@ -186,7 +185,7 @@ def read_crazyflie(path: Path, *, flow_instance: int | None = None) -> Log:
     (a Crazyflie has one flow deck).
     """
     if flow_instance is not None:
-        raise InputError(f"--flow-instance: {path} is of a Crazyflie, with one flow deck; leave it out")
+        raise InputError(f"{arg('flow_instance')}: {path} is of a Crazyflie, with one flow deck; leave it out")
     blocks = read_blocks(path)
     start_s = min((float(np.min(block.t_s)) for block in blocks.found if len(block.t_s)), default=0.0)
     for block in blocks.found:

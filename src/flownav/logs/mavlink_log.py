@@ -14,8 +14,7 @@ from flownav.core.frames import Quaternion
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import RATES, Table
 from flownav.logs.assembly import Origin, content_of, local_ned, near_the_rest, sha256_of
-from flownav.logs.frames import attitude_at, in_order, state_table
-from flownav.logs.log import SIMULATOR, Log, absences_of
+from flownav.logs.log import SIMULATOR, Log, absences_of, attitude_at, in_order, state_table
 from flownav.logs.mavlink.clock import Aligned, ClockState, align, stamp_of, told_unix_time
 from flownav.logs.mavlink.converted import Context, Dropped, Pose
 from flownav.logs.mavlink.framing import ARDUPILOT, INVALID_AUTOPILOT, PX4, Frame, Message, coder, dialect, tlog_frames

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.guard import an_input
 from flownav.core.measurement import Sensor
 from flownav.logs.crazyflie import looks_like as looks_like_crazyflie
@@ -51,10 +51,12 @@ def open_log(path: Path, *, flow_instance: int | None = None, topics: Mapping[st
 
         return read_ros(path, flow_instance=flow_instance, topics=topics)
     if topics:
-        raise InputError(f"--topic: {path} is no ROS bag; leave it out")
+        raise InputError(f"{arg('topics')}: {path} is no ROS bag; leave it out")
     if folder:
         if flow_instance is not None:
-            raise InputError(f"--flow-instance: {path} is a folder of CSV files, with one flow sensor; leave it out")
+            raise InputError(
+                f"{arg('flow_instance')}: {path} is a folder of CSV files, with one flow sensor; leave it out"
+            )
         from flownav.logs.csv_folder import read_csv_folder
 
         return read_csv_folder(path)

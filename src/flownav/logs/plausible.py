@@ -14,7 +14,7 @@ import numpy as np
 from flownav.core.errors import InputError
 from flownav.core.frames import rotation_from_quaternion
 from flownav.core.measurement import Array, Sensor, Stream
-from flownav.logs.frames import attitude_at, attitude_rates, mean_over
+from flownav.logs.log import attitude_at, attitude_rates, mean_over
 
 LONGEST_LOG_S = 172_800.0
 # beyond these, in a stream's own unit, a record is damaged: far more than what a live link or a simulation lets through

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sensor, Stream
 from flownav.core.provenance import hash_of
 from flownav.core.record import FED, FED_FIRST, Record, Table
@@ -34,7 +34,9 @@ def read_live_record(path: Path, *, flow_instance: int | None = None) -> Log:
     InputError where it cannot be read, says not what a navigator was fed, or a flow instance is asked for.
     """
     if flow_instance is not None:
-        raise InputError(f"--flow-instance: {path} holds what a navigator was fed, of one flow sensor; leave it out")
+        raise InputError(
+            f"{arg('flow_instance')}: {path} holds what a navigator was fed, of one flow sensor; leave it out"
+        )
     return log_of_record(path, Record.load(path))
 
 
@@ -170,7 +172,7 @@ def is_ours(path: Path) -> bool:
 def log_of_export(path: Path, flow_instance: int | None) -> Log:
     """The log of an exported record. InputError where it holds no streams, or a flow instance is asked for."""
     if flow_instance is not None:
-        raise InputError(f"--flow-instance: {path} is a record of flownav's, of one flow sensor; leave it out")
+        raise InputError(f"{arg('flow_instance')}: {path} is a record of flownav's, of one flow sensor; leave it out")
     bag = Bag()
     rows: dict[str, list[dict[str, Any]]] = {}
     lost = 0

@@ -10,16 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.logs.assembly import possible_variance
 from flownav.logs.ulog_topics import Topic, Topics
 
 FLOW_TOPICS = ("vehicle_optical_flow", "optical_flow", "sensor_optical_flow")  # the first that saw enough
-ENOUGH = 0.5  # of what the best topic saw
+ENOUGH_SHARE = 0.5  # of what the best topic saw
 FASTEST_RAD_S = 70.0
 LONGEST_INTEGRATION_S = 1.0
-DOWNWARD = 25.0  # MAV_SENSOR_ROTATION_PITCH_270
+DOWNWARD_ROTATION = 25.0  # MAV_SENSOR_ROTATION_PITCH_270
 FARTHEST_M = 1000.0
 EIGHTH_TURN_RAD = 0.25 * np.pi
 
@@ -35,9 +35,9 @@ def flow_topic(path: Path, topics: Topics, instance: int | None) -> Topic | None
         if instance is None:
             return None
         listed = ", ".join(topic.label for topic in present) or "no optical flow at all"
-        raise InputError(f"{path}: --flow-instance {instance} is not in the log; it has {listed}")
+        raise InputError(f"{path}: {arg('flow_instance')} {instance} is not in the log; it has {listed}")
     most = max(map(_seen_s, asked))
-    preferred = next(topic for topic in asked if _seen_s(topic) >= ENOUGH * most).name
+    preferred = next(topic for topic in asked if _seen_s(topic) >= ENOUGH_SHARE * most).name
     return max((topic for topic in asked if topic.name == preferred), key=_seen_s)
 
 
@@ -121,7 +121,7 @@ def _keep_downward(topic: Topic) -> None:
     A signal quality of 0 means an invalid reading, but some drivers state no quality and write 0 throughout.
     """
     if topic.has("orientation"):
-        topic.keep(topic.columns["orientation"] == DOWNWARD, "not_downward")
+        topic.keep(topic.columns["orientation"] == DOWNWARD_ROTATION, "not_downward")
     distance_m = topic.matrix("current_distance")[:, 0]
     topic.keep(np.isfinite(distance_m), "not_finite")
     distance_m = topic.matrix("current_distance")[:, 0]

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from flownav.core.errors import InputError
 from flownav.core.text import plain
-from flownav.logs.ulog_rows import AT_ONCE, DATA, Places, nothing_announced, walk_data
+from flownav.logs.ulog_rows import AT_ONCE, DATA_KIND, Places, nothing_announced, walk_data
 
 MAGIC = b"\x55\x4c\x6f\x67\x01\x12\x35"
 HEADER_SIZE = 16
@@ -36,7 +36,7 @@ LARGEST_MESSAGE = 0xFFFF
 LARGEST_TOPIC = 8192  # bytes; uORB's largest have a quarter of that
 DEEPEST_NESTING = 8
 MOST_BAD_FORMATS = 1000
-APPENDED = 1  # the one incompatible flag that is known: data appended at stated offsets
+APPENDED_FLAG = 1  # the one incompatible flag that is known: data appended at stated offsets
 
 header_at = struct.Struct("<HB").unpack_from
 id_at = struct.Struct("<H").unpack_from
@@ -139,11 +139,11 @@ class Framing:
         if len(self.content) < HEADER_SIZE + 43 or self.content[HEADER_SIZE + 2] != ord("B"):
             return []
         flags = self.content[HEADER_SIZE + 11 : HEADER_SIZE + 19]
-        if flags[0] & ~APPENDED or any(flags[1:]):
+        if flags[0] & ~APPENDED_FLAG or any(flags[1:]):
             raise InputError(
                 f"{path}: a ULog with features that are not known here (flags {flags.hex()}); update flownav"
             )
-        if not flags[0] & APPENDED:
+        if not flags[0] & APPENDED_FLAG:
             return []
         offsets = struct.unpack_from("<3Q", self.content, HEADER_SIZE + 19)
         return sorted(offset for offset in offsets if HEADER_SIZE + 43 < offset < len(self.content))
@@ -191,7 +191,7 @@ class Framing:
     def _whole(self, number: int, row: int) -> bytes:
         """A data message without the padding behind its data."""
         size = self.subscribed[number][1]
-        return struct.pack("<HBH", size + 2, DATA, number) + self.content[row : row + size]
+        return struct.pack("<HBH", size + 2, DATA_KIND, number) + self.content[row : row + size]
 
     def _resynchronise(self, pos: int, limit: int) -> int:
         """Where the next two messages that can be begin; counts what lies between. A cut last message is no damage."""

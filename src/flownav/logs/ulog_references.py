@@ -9,7 +9,7 @@ from flownav.core.frames import heading_from_quaternion, rotation_from_quaternio
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Table
 from flownav.logs.assembly import possible_variance
-from flownav.logs.frames import attitude_at, state_table
+from flownav.logs.log import attitude_at, state_table
 from flownav.logs.ulog_topics import Topic, Topics
 
 LEAST_ROWS = 2

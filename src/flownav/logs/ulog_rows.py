@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from flownav.core.compile import kernel
 
-IDS = 1 << 16  # a message id has two bytes
+MESSAGE_IDS = 1 << 16  # a message id has two bytes
 HEADER, ID = 3, 2  # bytes before a row: length and kind, topic
-DATA = 68  # "D"
+DATA_KIND = 68  # "D"
 AT_ONCE = 1 << 18  # messages that one call of `walk_data` takes at most
 
 Bytes = NDArray[np.uint8]
@@ -17,7 +17,7 @@ Places = NDArray[np.int64]
 
 
 class Announced(NamedTuple):
-    """By message id (IDS,): least and most bytes of a row, 0 where the id is unknown, and whether it is wanted."""
+    """By message id (MESSAGE_IDS,): least and most bytes of a row, 0 where it is unknown, and whether it is wanted."""
 
     least: Places
     most: Places
@@ -26,7 +26,7 @@ class Announced(NamedTuple):
 
 def nothing_announced() -> Announced:
     """Before the first topic."""
-    return Announced(np.zeros(IDS, np.int64), np.zeros(IDS, np.int64), np.zeros(IDS, np.bool_))
+    return Announced(np.zeros(MESSAGE_IDS, np.int64), np.zeros(MESSAGE_IDS, np.int64), np.zeros(MESSAGE_IDS, np.bool_))
 
 
 @kernel
@@ -42,7 +42,7 @@ def walk_data(
     while pos + HEADER + ID <= limit and count < len(rows):
         size = int(content[pos]) + 256 * int(content[pos + 1])
         stop = pos + HEADER + size
-        if content[pos + 2] != DATA or size < ID or stop > limit:
+        if content[pos + 2] != DATA_KIND or size < ID or stop > limit:
             break
         number = int(content[pos + 3]) + 256 * int(content[pos + 4])
         if least[number] == 0 or size - ID < least[number] or size - ID > most[number]:

@@ -4,19 +4,8 @@ import numpy as np
 
 from flownav.core.frames import rotation_from_quaternion, to_body
 from flownav.core.measurement import Array, Sensor, Stream
-from flownav.logs.assembly import (
-    ALTITUDE_EXPONENT,
-    PLACE,
-    SCALE_HEIGHT_M,
-    SEA_LEVEL_PA,
-    Origin,
-    Rows,
-    keep_fixes,
-    keep_possible,
-    stream_of_rows,
-    streams_of_fixes,
-)
-from flownav.logs.frames import attitude_at
+from flownav.logs import assembly
+from flownav.logs.log import attitude_at
 from flownav.logs.ulog_topics import Topic, Topics
 
 LEAST_IMU_HZ = 20.0  # slower, an inertial reading says nothing of the motion between two
@@ -43,8 +32,8 @@ def attitude_stream(topics: Topics) -> tuple[Stream | None, str]:
 def _fields(sensor: Sensor, topic: Topic, names: tuple[str, ...], rejected: dict[str, int] | None = None) -> Stream:
     """Fields of a topic as they stand; rejected: what is counted already, the topic's own where it is not given."""
     counts = topic.rejected if rejected is None else rejected
-    rows = Rows(topic.t_s, {name: topic.columns[name] for name in names}, dict(counts))
-    return stream_of_rows(sensor, rows, names, topic.delay_s)
+    rows = assembly.Rows(topic.t_s, {name: topic.columns[name] for name in names}, dict(counts))
+    return assembly.stream_of_rows(sensor, rows, names, topic.delay_s)
 
 
 # -- inertial ----------------------------------------------------------------------------------------------
@@ -56,7 +45,7 @@ def imu_stream(topics: Topics) -> Stream | None:
     if rates is not None and force is not None and force.rate_hz >= LEAST_IMU_HZ:
         sources.append(_joined(rates, force))
     for source in sources:
-        keep_possible(source, Sensor.IMU, IMU_FIELDS)
+        assembly.keep_possible(source, Sensor.IMU, IMU_FIELDS)
     fast = [source for source in sources if source.rate_hz >= LEAST_IMU_HZ]
     if not fast:
         return None
@@ -98,7 +87,7 @@ def _joined(rates: Topic, force: Topic) -> Topic:
 
 
 # -- GPS ---------------------------------------------------------------------------------------------------
-def gps_streams(topics: Topics) -> tuple[list[Stream], Origin | None]:
+def gps_streams(topics: Topics) -> tuple[list[Stream], assembly.Origin | None]:
     """Velocity, then position, and the origin of the local frame; nothing where no fix is 3-D."""
     candidates = topics.of("vehicle_gps_position", "sensor_gps")
     if not candidates:
@@ -108,7 +97,7 @@ def gps_streams(topics: Topics) -> tuple[list[Stream], Origin | None]:
     sigma = fixes.matrix("s_variance_m_s", "eph", "epv")  # accuracies [m/s, m], whatever the first one's name says
     sigma[~(sigma > 0)] = np.nan
     velocity = fixes.matrix(*VELOCITY_FIELDS)
-    return streams_of_fixes(fixes, velocity, sigma[:, [0, 0, 0]] ** 2, sigma[:, [1, 1, 2]] ** 2, fixes.delay_s)
+    return assembly.streams_of_fixes(fixes, velocity, sigma[:, [0, 0, 0]] ** 2, sigma[:, [1, 1, 2]] ** 2, fixes.delay_s)
 
 
 def _fixes(topic: Topic) -> Topic:
@@ -120,8 +109,8 @@ def _fixes(topic: Topic) -> Topic:
     velocity = topic.matrix(*VELOCITY_FIELDS)
     known = (abs(velocity) < FASTEST_M_S).all(axis=1) & (topic.columns.get("vel_ned_valid", np.ones(len(topic))) > 0)
     velocity[~known] = np.nan
-    topic.columns |= dict(zip((*PLACE, *VELOCITY_FIELDS), (*place.T, *velocity.T), strict=True))
-    keep_fixes(topic, topic.columns.get("fix_type", np.zeros(len(topic))))
+    topic.columns |= dict(zip((*assembly.PLACE, *VELOCITY_FIELDS), (*place.T, *velocity.T), strict=True))
+    assembly.keep_fixes(topic, topic.columns.get("fix_type", np.zeros(len(topic))))
     return topic
 
 
@@ -135,7 +124,9 @@ def baro_stream(topics: Topics) -> Stream | None:
     if topic is not None and not topic.has("altitude"):
         pressure = topic.columns["pressure"]
         pressure_pa = np.where(pressure < LARGEST_HECTOPASCAL, 100.0, 1.0) * np.maximum(pressure, 0.0)
-        topic.columns["altitude"] = SCALE_HEIGHT_M * (1.0 - (pressure_pa / SEA_LEVEL_PA) ** ALTITUDE_EXPONENT)
+        topic.columns["altitude"] = assembly.SCALE_HEIGHT_M * (
+            1.0 - (pressure_pa / assembly.SEA_LEVEL_PA) ** assembly.ALTITUDE_EXPONENT
+        )
     return None if topic is None else _fields(Sensor.BARO, topic, ("altitude",))
 
 
@@ -193,5 +184,5 @@ def pad_stream(topics: Topics, attitude: Stream | None) -> Stream | None:
 
 def _pad(topic: Topic, value: Array) -> Stream:
     names = ("forward", "right", "distance")
-    rows = Rows(topic.t_s, dict(zip(names, value.T, strict=True)), dict(topic.rejected))
-    return stream_of_rows(Sensor.PAD, rows, names, topic.delay_s)
+    rows = assembly.Rows(topic.t_s, dict(zip(names, value.T, strict=True)), dict(topic.rejected))
+    return assembly.stream_of_rows(Sensor.PAD, rows, names, topic.delay_s)

@@ -11,10 +11,10 @@ import numpy as np
 
 from flownav.core.compile import ONE_LANE, compiled, equation, kernel, pointer
 from flownav.core.measurement import Array
+from flownav.estimation.consistency import pack, unpack
 from flownav.estimation.law import Signature
 from flownav.estimation.motion import add_motion_noise, errors_in_motion, strapdown
 from flownav.estimation.named import AccelBias, Attitude, GyroBias, Inertial, PositionNed, VelocityNed
-from flownav.estimation.packed import pack, unpack
 from flownav.estimation.states import (
     PLACES,
     ROWS_BY_NAME,

@@ -13,8 +13,8 @@ from flownav.core.frames import (
     rotation_from_quaternion,
 )
 from flownav.estimation.covariance import consider, consider_none, variance_of
+from flownav.estimation.laws import component
 from flownav.estimation.laws.attitude import attitude, bridged_attitude, level
-from flownav.estimation.laws.geometry import component
 from flownav.estimation.named import Attitude
 from flownav.estimation.states import ATTITUDE, CONSIDERS, FLOW_LAG, GYRO_BIAS, INS_ERROR, MEASURED
 from flownav.navigation.heading import HeadingVerdict, conclude_heading, offered_heading

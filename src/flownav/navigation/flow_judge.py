@@ -3,7 +3,7 @@
 import numpy as np
 
 from flownav.core.compile import cos, equation, exp, larger, replacing, smaller
-from flownav.estimation.laws.geometry import lens_range
+from flownav.estimation.laws import lens_range
 from flownav.navigation.flow_noise import LONGEST_STEP_S
 from flownav.navigation.height import MANY_STRAYS
 from flownav.navigation.memory import holds

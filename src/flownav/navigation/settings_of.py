@@ -15,11 +15,9 @@ from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
 from flownav.sensors.barometer import BarometerSheet
 from flownav.sensors.camera_sheets import FlowCameraSheet, PadCameraSheet
 from flownav.sensors.datasheet import FlowSensor, identified_flow, needs_lag_states
-from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
-from flownav.sensors.inertial_sheet import InertialSheet
 from flownav.sensors.magnetometer import MagneticField, MagnetometerSheet
 from flownav.sensors.range_sensor import RangeSensorSheet
-from flownav.sensors.sheets import SensorSheets
+from flownav.sensors.sheets import GpsReceiverSheet, InertialSheet, SensorSheets
 
 ABOVE_FLOOR_M = 0.01  # a step of the shipped lidar: a rangefinder that reads its floor says only that there is no more
 LEAST_SHARE = 0.05  # of a stated accuracy, where the sheet says what changes from fix to fix: chosen, not measured

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from flownav.core.compile import ONE_LANE, kernel, pointer
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array, EventQueue
-from flownav.estimation.attitude_error import fold_attitude
 from flownav.estimation.covariance import at
 from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.smoother import (
@@ -23,7 +22,7 @@ from flownav.estimation.smoother import (
     back_over_reset,
     smoothed_covariance,
 )
-from flownav.estimation.states import CONSIDERS, QUATERNION, STATE, STATES
+from flownav.estimation.states import CONSIDERS, QUATERNION, STATE, STATES, fold_attitude
 from flownav.navigation.entries import (
     CORRECTED,
     DECAYED,

@@ -12,7 +12,7 @@ import numpy as np
 
 from flownav.core.compile import Lanes, Work, equation, larger, procedure, replacing, smaller, squared
 from flownav.estimation.covariance import consider_none
-from flownav.estimation.laws.geometry import component
+from flownav.estimation.laws import component
 from flownav.estimation.laws.still import gyro_at_rest, velocity_itself
 from flownav.estimation.states import ACCEL_BIAS, VELOCITY
 from flownav.navigation.inertial import sound

@@ -46,8 +46,7 @@ class Finding(NamedTuple):
 
     def as_json(self) -> dict[str, object]:
         """What the command prints."""
-        said = {"topic": self.topic, "paper": self.paper, "here": self.here, "agrees": self.agrees}
-        return said | {"circular": self.circular}
+        return {name: value for name, value in self._asdict().items() if name != "decides"}
 
 
 def of_laboratory(laboratory: Laboratory) -> list[Finding]:
@@ -202,7 +201,7 @@ def _errors(topic: str, printed: list[ErrorRow], ours: list[ErrorRow]) -> Findin
 def of_flights(flights: Flights) -> list[Finding]:
     """Largest error, the states' spreads, and the receiver of Table 4."""
     printed, ours = flights.published["max_position_error_m"], flights.scores["max_position_error_m"]
-    title, name = flights.published["title"], {"takeoff": "take-off"}.get(flights.scenario, flights.scenario)
+    title, name = flights.published["title"], flights.what
     near = abs(ours["median"] / printed - 1.0) <= LARGEST_TOLERANCE
     words = f"{_spread(ours)} m; the paper's flight at percentile {flights.percentile['max_position_error_m']:.0f}"
     chosen = circular(flights)

@@ -14,7 +14,7 @@ from flownav.core.record import Record
 from flownav.lab.optics.firmware import EARLY_GYRO_SCALE
 from flownav.lab.rig.instruments import SONAR_ECHO_S, SONAR_PERIOD_S
 from flownav.scoring.errors import STATES, percentile_of_paper, published, scores_of_flight, scores_of_flights
-from flownav.scoring.percentiles import spread
+from flownav.scoring.landings import spread
 from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.engine import fly_blocks, fly_written
 from flownav.simulation.flight_record import record_of
@@ -40,12 +40,8 @@ class LiftOff(NamedTuple):
 
     def as_json(self) -> dict[str, Any]:
         """Median, 5th and 95th percentile of each."""
-        return {
-            "flights": len(self.shaken_m_s),
-            "shaken_m_s": spread(self.shaken_m_s),
-            "unshaken_m_s": spread(self.unshaken_m_s),
-            "frozen_inflow_share": spread(self.frozen_inflow_share),
-        }
+        spreads = {name: spread(getattr(self, name)) for name in (*self._fields, "frozen_inflow_share")}
+        return {"flights": len(self.shaken_m_s), **spreads}
 
 
 def lift_offs(shaken: Flight, unshaken: Flight, seed: int, flights: int) -> LiftOff | None:
@@ -93,6 +89,11 @@ class Flights:
     record: Record
     white_noise_m: float
     lift_off: LiftOff | None = None
+
+    @property
+    def what(self) -> str:
+        """What is flown, in a word."""
+        return {"takeoff": "take-off"}.get(self.scenario, self.scenario)
 
     def as_json(self) -> dict[str, Any]:
         """The table's rows: published and reproduced, each state, and where the paper lies among our flights."""

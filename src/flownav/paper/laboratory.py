@@ -22,7 +22,7 @@ from flownav.sensors.datasheet import Dynamics
 from flownav.sensors.processes import hold_step, second_order_hold
 
 ORDERS = (0, 1, 2, 3, 4)
-SECOND = Structure(2)
+SECOND_ORDER = Structure(2)
 OTHER_RUNS = 1
 LIGHTS = ("low", "intense")
 
@@ -239,7 +239,7 @@ def table_2(laboratory: Laboratory, dynamics: Callable[[Run, int], Dynamics]) ->
 
 def table_3(laboratory: Laboratory, dynamics: Dynamics | None = None) -> list[ErrorRow]:
     """The selected model at every height, over the runs it does not come from; another model in its place if given."""
-    height_0, model_0 = published.SELECTED
+    height_0, model_0 = published.SELECTED_MODEL
     chosen = laboratory.at(height_0)[model_0 - 1]
     rows = []
     for height_m in HEIGHTS_M:

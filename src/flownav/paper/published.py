@@ -14,7 +14,7 @@ HEIGHTS_M = (0.6, 0.8, 1.0, 1.5)
 MODELS = 7
 # section III.E, the four relations (model 2 of each height)
 RELATION_FITS = {0.6: 87.0, 0.8: 78.0, 1.0: 72.0, 1.5: 57.0}
-SELECTED = (0.6, 2)  # "natural frequency 13.8528 rad/s": Table 1, 60 cm, model 2
+SELECTED_MODEL = (0.6, 2)  # "natural frequency 13.8528 rad/s": Table 1, 60 cm, model 2
 LARGEST_CLAIM_M = 0.27
 
 
@@ -85,7 +85,7 @@ def table_3() -> list[ErrorRow]:
 
 def selected_model() -> IdentifiedModel:
     """The model that the paper's Table 3 and its filter use."""
-    return next(row for row in table_1() if (row.height_m, row.model) == SELECTED)
+    return next(row for row in table_1() if (row.height_m, row.model) == SELECTED_MODEL)
 
 
 def inconsistencies() -> list[Inconsistency]:

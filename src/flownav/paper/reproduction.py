@@ -109,16 +109,13 @@ def _table_1_rows(of: Laboratory) -> list[dict[str, Any]]:
 
 def _error_row(printed: ErrorRow, ours: ErrorRow, theirs: ErrorRow, **more: Any) -> dict[str, Any]:
     """Published, reproduced, and the published model on our runs."""
-    return {
-        "height_m": printed.height_m,
-        "mean_error_published": printed.mean_error,
-        "mean_error_reproduced": ours.mean_error,
-        "std_error_published": printed.std_error,
-        "std_error_reproduced": ours.std_error,
-        **more,
-        "mean_error_of_published_model": theirs.mean_error,
-        "std_error_of_published_model": theirs.std_error,
+    pairs = {
+        f"{error}_{whose}": getattr(row, error)
+        for error in ("mean_error", "std_error")
+        for whose, row in (("published", printed), ("reproduced", ours))
     }
+    own = {"mean_error_of_published_model": theirs.mean_error, "std_error_of_published_model": theirs.std_error}
+    return {"height_m": printed.height_m, **pairs, **more, **own}
 
 
 def reproduce(

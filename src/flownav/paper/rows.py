@@ -142,14 +142,9 @@ def order_rows(of: Reproduction) -> list[TableRow]:
     """Fit by order, one row a height and kind of run; a second row for runs the model has not seen."""
     rows = []
     for test in of.laboratory.orders if of.laboratory else ():
-        rows.append(TableRow(f"{test.kind}, {test.height_m:.1f} m", [number(fit, 1) for fit in test.fits.values()]))
-        if test.unseen:
-            rows.append(
-                TableRow(
-                    f"{test.kind}, {test.height_m:.1f} m, the next run",
-                    [number(fit, 1) for fit in test.unseen.values()],
-                )
-            )
+        name = f"{test.kind}, {test.height_m:.1f} m"
+        for head, fits in ((name, test.fits), (f"{name}, the next run", test.unseen)):
+            rows += [TableRow(head, [number(fit, 1) for fit in fits.values()])] if fits else []
     return rows
 
 

@@ -13,7 +13,6 @@ from flownav.paper.rows import TableRow, kept_together
 from flownav.report.panels import Tile, listed, number
 from flownav.scoring.errors import STATES
 
-FLIGHT_NAMES = {"takeoff": "take-off", "landing": "landing"}
 UNITS = dict(zip(STATES, ("m", "m", "m", "m/s", "m/s", "m/s"), strict=True))
 
 
@@ -23,9 +22,7 @@ def facts(of: Reproduction) -> list[tuple[str, str]]:
     if of.laboratory is not None:
         shown.append(("Rig runs", f"{len(of.laboratory.runs)} of {of.laboratory.fixed.settings.duration_s:.0f} s"))
     if of.flights:
-        shown.append(
-            ("Flights", " and ".join(f"{flown.flights} {FLIGHT_NAMES[flown.scenario]}s" for flown in of.flights))
-        )
+        shown.append(("Flights", " and ".join(f"{flown.flights} {flown.what}s" for flown in of.flights)))
     return shown
 
 
@@ -44,7 +41,7 @@ def summary(of: Reproduction) -> str:
     for flown in of.flights:
         largest, honest = flown.scores["max_position_error_m"]["median"], flown.honest["max_position_error_m"]["median"]
         said.append(
-            f"At {FLIGHT_NAMES[flown.scenario]} the largest position error of the median flight is {largest:.3f} m "
+            f"At {flown.what} the largest position error of the median flight is {largest:.3f} m "
             f"(the paper: {flown.published['max_position_error_m']:.3f} m); with the receiver of its Table 4 "
             f"it is {honest:.1f} m."
         )
@@ -67,7 +64,7 @@ def tiles(of: Reproduction) -> list[Tile]:
     for flown in of.flights:
         largest = flown.scores["max_position_error_m"]["median"]
         note = f"paper {flown.published['max_position_error_m']:.3f} m"
-        found.append(Tile(f"Largest error, {FLIGHT_NAMES[flown.scenario]}", f"{largest:.3f}", "m", note))
+        found.append(Tile(f"Largest error, {flown.what}", f"{largest:.3f}", "m", note))
     if of.table_2 or of.table_3:
         name, table, printed = (
             ("Table 2", of.table_2, published.table_2()) if of.table_2 else ("Table 3", of.table_3, published.table_3())
@@ -127,14 +124,8 @@ def _flight_table(flown: Flights) -> FlightTable:
         for statistic in ("mean_error", "std_error"):
             cells += [number(theirs[statistic]), _spread(ours[statistic]), number(where[statistic], 0)]
         rows.append(TableRow(f"{state} ({UNITS[state]})", [*cells, _spread(ours["max_error"])]))
-    return FlightTable(
-        flown.scenario,
-        f"{flown.published['title']}: {FLIGHT_NAMES[flown.scenario]}",
-        flown.flights,
-        rows,
-        _touchdown(flown),
-        leaking(flown),
-    )
+    title = f"{flown.published['title']}: {flown.what}"
+    return FlightTable(flown.scenario, title, flown.flights, rows, _touchdown(flown), leaking(flown))
 
 
 def leaking(flown: Flights) -> str:
@@ -184,19 +175,15 @@ def _range(entry: dict[str, float], digits: int = 4) -> str:
 
 def own_systems(of: Reproduction) -> list[tuple[str, str, str]]:
     """This reproduction's rows of the comparison: what, figure, what it measures."""
+    error = "largest difference between estimate and truth on one axis"
+    place = "distance of simulated touchdowns from the pad's centre; the autopilot notes the pad at the start"
     rows = []
     for flown in of.flights:
-        name = FLIGHT_NAMES[flown.scenario]
         for gps, scores in (("white GPS noise of 0.3 m", flown.scores), ("GPS of 2 m CEP", flown.honest)):
-            largest = scores["max_position_error_m"]
-            what = "largest difference between estimate and truth on one axis"
-            rows.append((f"Here: {name}, {gps}", _centimetres(largest), what))
-            landed = scores["touchdown"]
+            name, landed = f"Here: {flown.what}, {gps}", scores["touchdown"]
+            rows.append((name, _centimetres(scores["max_position_error_m"]), error))
             if landed and landed["contact"]["distance_m"]:
-                what = (
-                    "distance of simulated touchdowns from the pad's centre; the autopilot notes the pad at the start"
-                )
-                rows.append((f"Here: {name}, {gps}", _centimetres(landed["contact"]["distance_m"]), what))
+                rows.append((name, _centimetres(landed["contact"]["distance_m"]), place))
     return rows
 
 

@@ -37,8 +37,7 @@ from flownav.navigation.tape import ESTIMATE_PERIOD_S, output_of, write_estimate
 from flownav.parts.protocols import Estimate, Imu, Innovation, Outputs, Reading, Told
 from flownav.simulation import layout
 from flownav.simulation.layout import load_around, load_controls
-from flownav.vehicle.around import Around
-from flownav.vehicle.state import Controls
+from flownav.vehicle.state import Around, Controls
 
 RIGID = 13
 NAN = math.nan

@@ -1,6 +1,7 @@
 """Flights with parts of somebody else's on the compiled loop: one as a scored Record, or a campaign's.
 
-A campaign flies them one after the other, or, where they are equations, on lanes.
+A campaign flies them one after the other, or, where they are equations, on lanes. Last: a log through a filter of
+somebody else's, in our navigator's place.
 """
 
 import copy
@@ -22,14 +23,19 @@ from flownav.core.compile import LANES, ONE_LANE, announce_compilation
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array
 from flownav.core.record import Record
+from flownav.logs.log import Log
+from flownav.navigation.loop import Running
 from flownav.navigation.packed import load_flow_settings
+from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.take import navigator_unit
 from flownav.navigation.told import carries_lag
 from flownav.parts.calling import Mistakes, name_of
 from flownav.parts.equations import EquationFilter, EquationVehicle
 from flownav.parts.plant import OwnController, OwnReadings, OwnVehicle
-from flownav.parts.protocols import Parts, Told
+from flownav.parts.protocols import Filter, Parts, Told
 from flownav.parts.taking import Taker
+from flownav.replays.prepare import ReplayOptions
+from flownav.replays.session import Replay, replay
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import Flown, Instead, buffers_of, fly_into
 from flownav.simulation.ensemble import Ensemble
@@ -232,3 +238,25 @@ def _source(made_of: Any) -> str:
         except (OSError, TypeError):
             continue
     return repr(made_of)
+
+
+def replay_with(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, part: Filter) -> Replay:
+    """A log's readings, prepared as for ours, through this filter, which begins anew.
+
+    InputError as `replay`, and where the filter makes a mistake.
+    """
+    mistakes, kept = Mistakes(), []
+
+    def instead(running: Running) -> int:
+        if isinstance(part, EquationFilter):
+            return part.unit(ONE_LANE).address
+        kept.append(Taker(fresh(part), Told(running.told), running.work, running.tape, mistakes))
+        return kept[-1].address
+
+    try:
+        flown = replay(log, options, settings, instead=instead)
+    except InputError:
+        mistakes.tell()  # its own mistake says more than that it never started
+        raise
+    mistakes.tell()
+    return flown

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from flownav.control.guidance import reference_at
+from flownav.control.go_around import reference_at
 from flownav.core.compile import ONE_LANE, runge_kutta
 from flownav.core.errors import InputError
 from flownav.core.frames import GRAVITY_M_S2, rotation_from_quaternion
@@ -23,8 +23,7 @@ from flownav.simulation.navigating import TRUTH, Timetable, first_truth
 from flownav.simulation.plan import ATTITUDE_S, Flight
 from flownav.simulation.records import AttitudeError, Loads
 from flownav.simulation.sensing import EPOCH_S
-from flownav.vehicle.around import Around
-from flownav.vehicle.state import Controls
+from flownav.vehicle.state import Around, Controls
 
 RIGID = 13
 load_error, _ = layout.PLANT.access(AttitudeError)

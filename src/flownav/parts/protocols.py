@@ -8,11 +8,10 @@ from collections.abc import Iterable
 from typing import NamedTuple, Protocol, runtime_checkable
 
 from flownav.control.gains import AutopilotGains
-from flownav.control.guidance import Reference
+from flownav.control.go_around import Reference
 from flownav.core.measurement import Array, Sensor
 from flownav.navigation.told import NavigatorSettings
-from flownav.vehicle.around import Around
-from flownav.vehicle.state import Controls
+from flownav.vehicle.state import Around, Controls
 
 UNKNOWN = (math.nan, math.nan, math.nan)
 NO_BIAS = (0.0, 0.0, 0.0)

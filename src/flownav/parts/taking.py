@@ -26,7 +26,7 @@ from flownav.parts.protocols import Estimate, Filter, Imu, Innovation, Reading, 
 STATED = 3
 QUALITY, ARRIVED, WITHHELD = (READING + MAX_VALUES + STATED + i for i in range(3))
 STALE_S = 0.1  # so long an inertial reading serves
-UNIT = 1e-3  # how far a quaternion's length may be from 1
+UNIT_TOLERANCE = 1e-3  # how far a quaternion's length may be from 1
 
 
 class Taker:
@@ -163,6 +163,6 @@ def checked(name: str, said: Estimate) -> dict[str, Array]:
             array = np.atleast_1d(np.asarray(value, dtype=float))
             if array.shape != (length,) or not np.isfinite(array).all():
                 raise InputError(f"{name}: estimate().{key} is {array.tolist()}; {length} finite, or None, is needed")
-    if abs(float(np.linalg.norm(found["quaternion"])) - 1.0) > UNIT:
+    if abs(float(np.linalg.norm(found["quaternion"])) - 1.0) > UNIT_TOLERANCE:
         raise InputError(f"{name}: estimate().quaternion has length {np.linalg.norm(found['quaternion']):.3f}, not 1")
     return found

@@ -13,8 +13,7 @@ from flownav.core.frames import rotation_from_quaternion
 from flownav.core.measurement import COLUMNS, Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.estimation.gating import Reason
-from flownav.logs.frames import attitude_at
-from flownav.logs.log import Log
+from flownav.logs.log import Log, attitude_at
 from flownav.navigation.flags import flagged, flags_of
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tables import estimate_table, happenings, innovation_table, states_table
@@ -24,7 +23,7 @@ from flownav.replays.session import Replay, replay
 from flownav.scoring.reference import velocity_of
 from flownav.sensors.datasheet import IdentifiedFlow
 
-KEPT = (
+KEPT_SENSORS = (
     Sensor.GPS_POSITION,
     Sensor.GPS_VELOCITY,
     Sensor.FLOW_RATE,
@@ -46,7 +45,7 @@ def to_record(replay: Replay, scores: dict[str, Any], command: list[str] | str) 
     record.add("states", states_table(estimate))
     if replay.smoothed is not None:
         record.add("smoothed", estimate_table(replay.smoothed))
-    for sensor in KEPT:
+    for sensor in KEPT_SENSORS:
         if sensor in replay.log.streams:
             stream = replay.log.streams[sensor]
             columns = dict(zip(COLUMNS[sensor], _with_turning(replay, sensor).T, strict=True))

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import EventQueue, Sensor
 from flownav.core.parameter_files import check
 from flownav.logs.log import Log
@@ -27,8 +27,10 @@ def as_fed(
     if not log.fed:
         return options, settings or NavigatorSettingsFile()
     if options.flow_scale != (1.0, 1.0) or options.identified is not None:
-        raise InputError(f"{log.path}: it holds flow as it was fed; replay it without --flow-scale, --sensor")
-    check_windows(log, options.gps_outages_s, "--gps-outage")
+        raise InputError(
+            f"{log.path}: it holds flow as it was fed; replay it without {arg('flow_scale')}, {arg('sensor')}"
+        )
+    check_windows(log, options.gps_outages_s, arg("gps_outages"))
     try:
         for segment in log.fed:
             Equipment(**segment.equipment)

@@ -14,16 +14,14 @@ from flownav.core.record import Table
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
 from flownav.navigation.feed import SLOWEST_IMU_HZ, imu_serves, rate_hz
-from flownav.navigation.flags import flagged, flags_of
 from flownav.navigation.reasons import HORIZONTAL, REFUSALS
-from flownav.navigation.rows import EstimateRow, InnovationRow
-from flownav.navigation.tables import Written, estimate_table
+from flownav.navigation.rows import InnovationRow
 from flownav.replays.prepare import GPS
 from flownav.replays.sentinel import Finding
-from flownav.scoring.consistency import consistency_of
+from flownav.scoring.consistency import consistency_by_sensor
 from flownav.scoring.coverage import coverage_of
-from flownav.scoring.path import autopilot_errors, in_frame_of, motion_of, truth_motion
-from flownav.scoring.reference import drift_of, flight_of, protection_of
+from flownav.scoring.path import autopilot_errors, in_frame_of
+from flownav.scoring.reference import flight_of
 
 ON_THE_GROUND = 20  # readings of a range that starts on the ground: chosen, 0.4 to 2 s
 LIFTED_M = 0.3  # sound ranges vary by 0.01 m on the ground (indoor-made); outdoor-2's sonar jumps, and errs by 4 s
@@ -94,13 +92,10 @@ def consistency_scores(innovation: Array) -> dict[str, dict[str, Any]]:
     """By sensor, of the components that were held against their prediction; innovation: rows of a tape's."""
     offered = InnovationRow.of(innovation)
     tested = np.isin(offered.reason, TESTED)
-    found = {}
-    for sensor in Sensor:
-        rows = InnovationRow.of(innovation[tested & (offered.sensor == sensor)])
-        judged = consistency_of(rows.component, rows.innovation, rows.innovation_variance)
-        if judged is not None:
-            found[sensor.name.lower()] = judged._asdict()
-    return found
+    return consistency_by_sensor(
+        lambda sensor: tested & (offered.sensor == sensor),
+        offered.component, offered.innovation, offered.innovation_variance,
+    )  # fmt: skip
 
 
 def told(innovation: Array) -> Array:
@@ -156,18 +151,6 @@ def _readings(offers: InnovationRow[Array]) -> NDArray[np.int_]:
 def coverage_scores(log: Log) -> dict[str, dict[str, float]]:
     """By stream, its first and last reading [s]."""
     return {name: {"t0": first, "t1": last} for name, (first, last) in coverage_of(log.streams).items()}
-
-
-def protection_scores(log: Log, written: Written) -> dict[str, Any] | None:
-    """The levels of a replay, and how often they were exceeded unsaid."""
-    rows = written.estimate
-    drift = (
-        None
-        if log.truth is None
-        else drift_of(motion_of(estimate_table(rows)), truth_motion(log.truth, log.heading_truth), airborne_of(log))
-    )
-    said = EstimateRow.of(rows)
-    return protection_of(said.t_s, said.protection_m, flagged(said.t_s, flags_of(written.event)), drift)
 
 
 def unfused(innovation: Array, streams: Mapping[Sensor, Stream]) -> list[Finding]:

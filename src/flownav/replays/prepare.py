@@ -12,10 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.compile import kernel
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array, EventQueue, Sensor, Stream, merge, merged_parts
-from flownav.logs.frames import attitude_rates, mean_over
-from flownav.logs.log import Log
+from flownav.logs.log import Log, attitude_rates, mean_over
 from flownav.navigation.feed import imu_serves
 from flownav.navigation.spikes import Witness
 from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
@@ -26,10 +25,10 @@ FLOW = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
 GYRO_BIAS_TIME_S = 10.0  # as PX4's EKF2 follows it at 10 Hz: 1 % a reading
 LONGEST_FLOW_INTERVAL = 1.5  # medians: a longer step is a gap, not an exposure; chosen
 OWN, IMU, TURNING = "sensor gyro", "imu gyro", "attitude"
-SIGNIFICANT = 3.0  # standard errors, one in 700 by chance: else the sensor's own gyro serves
+SIGNIFICANT_SIGMAS = 3.0  # standard errors, one in 700 by chance: else the sensor's own gyro serves
 LEAST_FLOW_ROWS = 50  # chosen: 5 s of a PX4FLOW at 9.5 Hz
 KEPT_QUEUE = 1 << 20  # events of a queue that is kept for the next run: 150 MB
-PART = 1 << 17  # events that are merged at a time where there are more
+MERGED_EVENTS = 1 << 17  # events that are merged at a time where there are more
 SCALE_LIMITS = (0.1, 10.0)  # chosen: recorded scales are 0.7 to 1 (../shared/data/README.md)
 # PX4 writes it once a second, ArduPilot when it changes: not repeated, a vehicle that stands with its motors running
 # wanders more than 20 m in a minute, and less than 3 as it is (test_landed)
@@ -70,7 +69,7 @@ class Prepared:
         if sum(map(len, self.streams.values())) <= KEPT_QUEUE:
             yield self.queue
         else:
-            yield from merged_parts(self.streams.values(), PART)
+            yield from merged_parts(self.streams.values(), MERGED_EVENTS)
 
     @property
     def span_s(self) -> tuple[float, float]:
@@ -129,13 +128,13 @@ def withhold(log: Log, queue: EventQueue, options: ReplayOptions) -> EventQueue:
 
 def _check(log: Log, options: ReplayOptions) -> None:
     if not 0.0 <= options.gps_delay_s <= 5.0:
-        raise InputError(f"--gps-delay {options.gps_delay_s:g}: seconds from 0 to 5 are needed")
+        raise InputError(f"{arg('gps_delay_s')} {options.gps_delay_s:g}: seconds from 0 to 5 are needed")
     if not all(SCALE_LIMITS[0] <= scale <= SCALE_LIMITS[1] for scale in options.flow_scale):
         raise InputError(
-            f"--flow-scale {options.flow_scale[0]:g},{options.flow_scale[1]:g}: factors from {SCALE_LIMITS[0]:g} to "
-            f"{SCALE_LIMITS[1]:g} are needed; a wrong sign belongs mended in the log"
+            f"{arg('flow_scale')} {options.flow_scale[0]:g},{options.flow_scale[1]:g}: factors from "
+            f"{SCALE_LIMITS[0]:g} to {SCALE_LIMITS[1]:g} are needed; a wrong sign belongs mended in the log"
         )
-    check_windows(log, options.gps_outages_s, "--gps-outage")
+    check_windows(log, options.gps_outages_s, arg("gps_outages"))
 
 
 def check_windows(log: Log, windows: Iterable[tuple[float, float]], option: str) -> None:
@@ -302,4 +301,4 @@ def _significant(own: Array | None, other: Array) -> bool:
     if own is None:
         return True
     gain = own - other
-    return len(gain) > 0 and bool(gain.mean() > SIGNIFICANT * gain.std() / np.sqrt(len(gain) / 3.0))
+    return len(gain) > 0 and bool(gain.mean() > SIGNIFICANT_SIGMAS * gain.std() / np.sqrt(len(gain) / 3.0))

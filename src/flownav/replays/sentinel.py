@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from flownav.core.frames import rotation_from_quaternion, velocity_from_flow
 from flownav.core.measurement import COLUMNS, Array, Sensor, Stream
-from flownav.logs.frames import attitude_at, mean_over
+from flownav.logs.log import attitude_at, mean_over
 
 # Chosen so that nothing is said of quad-px4flow-outdoor, whole or in any part of 30 to 120 s, and each of its twelve
 # spoilt copies is found out (test_replay_sentinel). Halving or doubling any one of them changes no verdict on nine such
@@ -32,23 +32,23 @@ LAG_STEP_S = 0.1
 LEAST_OVERLAP = 0.7
 LARGEST_TILT_RAD = 0.8  # `tilt_limit_rad`, beyond which no flow is fused
 RANGE_LIMITS_M = (0.02, 100.0)  # the navigator's default limits of a range
-FASTEST = 2.0  # times the speed by GPS: a faster flow reading is a spike
-LIKE = 1.3  # noise ratio up to which two ways to read the flow are as good as each other
-CLEARLY = 0.5  # a better explanation leaves less than this share of the power that the other leaves
-UNEXPLAINED = 0.4  # an explanation that leaves more than this share of the power is none
+FASTEST_RATIO = 2.0  # times the speed by GPS: a faster flow reading is a spike
+LIKE_RATIO = 1.3  # noise ratio up to which two ways to read the flow are as good as each other
+CLEARLY_SHARE = 0.5  # a better explanation leaves less than this share of the power that the other leaves
+UNEXPLAINED_SHARE = 0.4  # an explanation that leaves more than this share of the power is none
 SLACK = (1.5, 0.05)  # a simpler explanation serves if it leaves no more than this: factor, and share of power
 LEAST_HEADING_ERROR_RAD = 0.35  # 20 deg: outdoor's own yaw is 5 to 7 off its course
 ABOUT_RAD = 2.6  # 149 deg
 LEAST_CLOCK_ERROR_S = 0.8  # outdoor's receiver itself lags by 0.23 s or more (../shared/data/README.md)
 CLIMB_INTERVAL_S = 2.0
 LEAST_CLIMB_LIKENESS = 0.3
-SIGNIFICANT = 3.5  # standard errors: one in 4000 by chance
+SIGNIFICANT_SIGMAS = 3.5  # standard errors: one in 4000 by chance
 
 Matrix = tuple[tuple[int, int], tuple[int, int]]
-RIGHT: Matrix = ((1, 0), (0, 1))
+AS_LOGGED: Matrix = ((1, 0), (0, 1))
 # How the flow's two columns may have been logged, as the matrix that puts them right.
 READINGS: dict[Matrix, str] = {
-    RIGHT: "",
+    AS_LOGGED: "",
     ((-1, 0), (0, -1)): "flow sign is inverted (both axes)",
     ((-1, 0), (0, 1)): "flow sign is inverted on the x axis",
     ((1, 0), (0, -1)): "flow sign is inverted on the y axis",
@@ -112,17 +112,17 @@ def _of_flow(course: Course, flow: Stream, streams: dict[Sensor, Stream]) -> lis
     fits = {reading: _fits(course, velocity[reading]) for reading in READINGS}
     left = {reading: min(fit.unexplained for fit in fits[reading]) for reading in READINGS}
     rotation = _rotation_noise(flow)
-    alike = [reading for reading in READINGS if rotation[reading] <= LIKE * min(rotation.values())]
-    if RIGHT in alike:
+    alike = [reading for reading in READINGS if rotation[reading] <= LIKE_RATIO * min(rotation.values())]
+    if AS_LOGGED in alike:
         others = [reading for reading in alike if reading not in TURNS]
         level = {reading: fits[reading][0].unexplained for reading in others}
         best = min(level, key=lambda reading: level[reading])
-        about = abs(fits[RIGHT][1].heading_rad) > ABOUT_RAD  # as likely a heading as a flow of the wrong sign: flow
-        mended = level[best] < CLEARLY * (fits[RIGHT][0].unexplained if about else left[RIGHT])
-        reading = best if mended else RIGHT
+        about = abs(fits[AS_LOGGED][1].heading_rad) > ABOUT_RAD  # as likely a heading as a flow of the wrong sign: flow
+        mended = level[best] < CLEARLY_SHARE * (fits[AS_LOGGED][0].unexplained if about else left[AS_LOGGED])
+        reading = best if mended else AS_LOGGED
     else:
         reading = min(alike, key=lambda reading: left[reading])
-    if left[reading] > UNEXPLAINED:
+    if left[reading] > UNEXPLAINED_SHARE:
         return []
     said = [Finding(f"{READINGS[reading]} against GPS; mend the log's flow columns", True)] if READINGS[reading] else []
     return [*said, *map(Finding, _of_heading_and_clock(fits[reading]))]
@@ -149,7 +149,7 @@ def _words(fit: Fit) -> str:
         words.append(f"heading is off by about {degrees:.0f} deg (the logged yaw lies {side} the course by GPS)")
     if abs(fit.clock_s) >= LEAST_CLOCK_ERROR_S:
         late = "late" if fit.clock_s > 0 else "early"
-        words.append(f"GPS clock is {late} by about {abs(fit.clock_s):.1f} s (beyond --gps-delay)")
+        words.append(f"GPS clock is {late} by about {abs(fit.clock_s):.1f} s (beyond the delay that is told)")
     return " and ".join(words)
 
 
@@ -241,7 +241,7 @@ def _velocity(reading: Matrix, flow: Stream, streams: dict[Sensor, Stream], cour
     third = -(rotation[6] * first + rotation[7] * second) / rotation[8]
     north = rotation[0] * first + rotation[1] * second + rotation[2] * third
     east = rotation[3] * first + rotation[4] * second + rotation[5] * third
-    fastest = FASTEST * float(np.quantile(abs(course.gps), 0.95))
+    fastest = FASTEST_RATIO * float(np.quantile(abs(course.gps), 0.95))
     held = np.minimum(1.0, fastest / np.maximum(np.hypot(north, east), 1e-9))
     north_east = np.column_stack([north * held, east * held])
     smooth = mean_over(t_s, north_east, t_s - 0.5 * SMOOTHING_S, t_s + 0.5 * SMOOTHING_S)
@@ -282,7 +282,7 @@ def _of_climb(streams: dict[Sensor, Stream], heard: dict[Sensor, Stream]) -> lis
     if len(instants) > 1:
         height.append((instants + velocity.delay_s, -range_m))
     signs = [_likeness_of_rates(stated, (np.interp(end, *to) - np.interp(start, *to))) for to in height]
-    if min(signs) <= -SIGNIFICANT and max(signs) < 0.0:
+    if min(signs) <= -SIGNIFICANT_SIGMAS and max(signs) < 0.0:
         return [Finding("vel_d of GPS has the wrong sign: it runs against the GPS altitude; down is positive")]
     return []
 

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from flownav.core.compile import announce_compilation
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, Table
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
 from flownav.navigation.feed import SLOWEST_IMU_HZ, equipment_of
+from flownav.navigation.flags import flagged, flags_of
 from flownav.navigation.loop import Instead, run, start_navigator
 from flownav.navigation.rows import EstimateRow, InnovationRow
 from flownav.navigation.settings import NavigatorSettingsFile
@@ -28,9 +29,8 @@ from flownav.replays.prepare import GPS, Prepared, ReplayOptions, check_windows,
 from flownav.replays.sentinel import Finding, findings
 from flownav.scoring import path as scored
 from flownav.scoring.coverage import silences
-from flownav.scoring.path import (
-    columns_of,
-)
+from flownav.scoring.path import columns_of
+from flownav.scoring.recorded import estimate_scores
 from flownav.scoring.reference import Alignment, OutageError
 
 HORIZONTAL = (*GPS, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
@@ -110,10 +110,6 @@ class Replay:
         """The outage error over a window."""
         return scored.outage_of(scored.path_of(self.table), self.references, t0, t1)
 
-    def velocity_rms(self) -> float | None:
-        """Horizontal velocity against GPS velocity at the instant it describes [m/s]; None without GPS."""
-        return scored.velocity_rms(scored.path_of(self.table), self.references)
-
     def rejected(self) -> dict[str, dict[str, int]]:
         """What was not fused, by sensor and reason: rows by the reader, components by the filter, added up."""
         counts = {}
@@ -126,41 +122,23 @@ class Replay:
                 counts[sensor.name.lower()] = dict(Counter(stream.rejected) + Counter(found))
         return counts
 
-    def truth_scores(self) -> dict[str, Any] | None:
-        """Errors against the log's truth, turned and shifted onto the estimate; None without one."""
-        return scored.truth_scores(scored.path_of(self.table), self.references)
-
-    def end_drift(self) -> float | None:
-        """Horizontal error at the end of the flight, the truth laid on the estimate at take-off [m]; None without."""
-        return scored.end_drift_of(scored.motion_of(self.table), self.references)
-
     def scores(self) -> dict[str, Any]:
         """What `--json` prints, but for the outage table and the record's path."""
         start, end = self.log.span_s
+        warned = flagged(self.said.t_s, flags_of(self.written.event))
         scores: dict[str, Any] = {
-            "duration_s": end - start,
-            **self.path_scores(),
-            "end_drift_m": self.end_drift(),
-            "protection": judged.protection_scores(self.log, self.written),
+            **estimate_scores(self.table, self.references, end - start, warned),
             "consistency": judged.consistency_scores(self.innovation),
             "coverage": judged.coverage_scores(self.log),
             "rejected": self.rejected(),
             "readings": judged.reading_scores(self.innovation, self.log.streams),
             "warnings": [finding.text for finding in self.findings],
         }
-        beside = {
-            "autopilot": judged.autopilot_scores(self.log, self.options.gps_delay_s),
-            "smoothed": self.smoothed_scores(),
-        }
-        return scores | {name: found for name, found in beside.items() if found is not None}
-
-    def path_scores(self) -> dict[str, Any]:
-        """Errors of the path: through each outage, of velocity against GPS, against the truth where there is one."""
-        return scored.path_scores(self.table, self.references)
-
-    def smoothed_scores(self) -> dict[str, Any] | None:
-        """Scores of the smoothed path; None without one."""
-        return None if self.smoothed is None else scored.path_scores(estimate_table(self.smoothed), self.references)
+        own = judged.autopilot_scores(self.log, self.options.gps_delay_s)
+        scores |= {} if own is None else {"autopilot": own}
+        if self.smoothed is not None:
+            scores["smoothed"] = scored.path_scores(estimate_table(self.smoothed), self.references)
+        return scores
 
 
 def references_of(log: Log, options: ReplayOptions) -> scored.References:
@@ -189,9 +167,9 @@ def replay(
     path, is to be smoothed.
     """
     if smoothed and log.fed:
-        raise InputError(f"{log.path}: --smooth takes a log; a live session's record is replayed as it was fed")
+        raise InputError(f"{log.path}: {arg('smooth')} takes a log; a live session's record is replayed as it was fed")
     if smoothed and instead is not None:
-        raise InputError(f"{log.path}: --smooth smooths our own filter's path; leave it out with another filter")
+        raise InputError(f"{log.path}: {arg('smooth')} smooths our own filter's path; leave it out with another filter")
     with announce_compilation("replay"):
         prepared = prepared_as_fed(log) if log.fed else prepare(log, options)
         return _run(log, options, settings, prepared, smoothed=smoothed, instead=instead)
@@ -216,7 +194,7 @@ def outage_table(
 
     InputError where a window lies outside the log.
     """
-    check_windows(log, windows, "--outage-table")
+    check_windows(log, windows, arg("outage_table"))
 
     def error_of(window: tuple[float, float]) -> OutageError:
         return _run(log, replace(options, gps_outages_s=(window,)), settings, prepared).outage(*window)
@@ -231,7 +209,7 @@ def outage_table(
 
 
 def table_windows(
-    t0: float, t1: float, length_s: float, *, option: str = "--outage-table"
+    t0: float, t1: float, length_s: float, *, option: str = arg("outage_table")
 ) -> list[tuple[float, float]]:
     """[t0, t0 + length), ... up to t1, the last one shorter where t1 asks for it.
 

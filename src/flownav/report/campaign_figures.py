@@ -11,7 +11,7 @@ from flownav.report.chart import drawn
 from flownav.report.panels import Panel
 from flownav.report.style import COLOUR, FONT, axis, layout, plotly
 
-DOTS = 2500
+MOST_DOTS = 2500
 FAR_M = 2.0  # from here on distances are drawn on a logarithmic axis
 SPEED, DIRECTION = "wind.speed_20ft_m_s", "wind.from_direction_deg"
 ROLES = ("estimate", "gps", "flow", "autopilot", "alert", "smoothed", "muted", "pad")
@@ -40,7 +40,7 @@ def common_reach_m(cells: Sequence[dict[str, Any]], touched: Sequence[Touchdowns
 def over_the_pad(key: str, cell: dict[str, Any], touched: Touchdowns, reach_m: float) -> Panel:
     """Where a cell's flights first touched, with circles that hold 50, 95 and 99.7 % of all."""
     known = np.isfinite(touched.distance_m)
-    every = max(1, int(np.ceil(known.sum() / DOTS)))
+    every = max(1, int(np.ceil(known.sum() / MOST_DOTS)))
     east, north = touched.east_m[known][::every], touched.north_m[known][::every]
     half, turn = 0.5 * touched.pad_m, np.linspace(0.0, 2.0 * np.pi, 181)
     pad = {"type": "rect", "x0": -half, "x1": half, "y0": -half, "y1": half, "layer": "below",

@@ -20,7 +20,7 @@ KNOWN_WORDS = {
 }
 MOST_DOTS = 4000
 MOST_BARS = 12
-TOGETHER = 2.0  # sum of total indices, beyond which inputs act mostly together
+LEAST_JOINT_INDEX = 2.0  # sum of total indices, beyond which inputs act mostly together
 # what a field of the envelope is: its words, its colour's role, and which fields are so
 FIELDS = (
     ("pass", "flow", lambda field: field["verdict"] == "pass"),
@@ -232,7 +232,7 @@ def ranking(facts: Mapping[str, Any]) -> list[Panel]:
         "First: what knowing the input alone would take away; total: what stays while it alone is unknown."
     )
     caption += " Ranks, since figures that are infinite or far off would decide alone." if of else ""
-    if sum(row["total"] for row in facts["ranking"]) > TOGETHER:
+    if sum(row["total"] for row in facts["ranking"]) > LEAST_JOINT_INDEX:
         caption += (
             " The totals add up to far more than 1: inputs act together, and with the noise, which acts otherwise after"
             " a small change of any. Then the first indices say what helps."

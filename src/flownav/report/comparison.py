@@ -11,7 +11,7 @@ from flownav.core.measurement import Array
 from flownav.core.record import Record
 from flownav.core.version import __version__
 from flownav.report.chart import Stack, sliding_mean
-from flownav.report.figures_path import Paths, View, paths_of
+from flownav.report.figures_states import Paths, PathsView, paths_of
 from flownav.report.html import (
     HERE,
     flight_facts,
@@ -118,9 +118,9 @@ def _sections(named: Named, errors: Errors, window: Window) -> list[Section]:
         names = ", ".join(name for name, _ in named)
         paths = [
             Panel("path-3d", "Paths in space", "Drag to turn, or use the arrow keys.", f"Paths in space of {names}.",
-                  View(together, "space")),
+                  PathsView(together, "space")),
             Panel("ground-track", "Ground tracks", "From above.", f"Paths over the ground of {names}.",
-                  View(together, "above")),
+                  PathsView(together, "above")),
         ]  # fmt: skip
     return [
         Section("path", "Paths", tuple(paths)),

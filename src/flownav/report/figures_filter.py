@@ -8,7 +8,7 @@ from flownav.report.chart import Stack, sliding_mean, sliding_rms
 from flownav.report.figures_innovation import SENSOR_TITLES, innovation_table
 from flownav.report.panels import Panel, number
 from flownav.report.series import Track, difference, mapping, moments, outages, readings, start_end_s, track
-from flownav.scoring.consistency import MODEST, SCORED, chi_square_band, consistency_of, verdict
+from flownav.scoring.consistency import MODEST_SQUARES, SCORED, chi_square_band, consistency_of, verdict
 
 STD_POSITION = tuple(f"std_{name}" for name in POSITION_NED)
 RADIUS_WINDOW_S = 5.0
@@ -112,7 +112,7 @@ def normalised_innovations(record: Record) -> list[Panel]:
     )
     for row, squares in enumerate(sensors.values(), 1):
         mean = np.maximum(sliding_mean(squares.t_s, squares.value[:, 0], NIS_WINDOW_S), SMALLEST_NIS)
-        for limit in MODEST:
+        for limit in MODEST_SQUARES:
             stack.line(row, "gate", "2 and 1/2", np.array(span), np.full(2, limit))
         stack.line(row, "command", "as stated", np.array(span), np.ones(2))
         stack.line(row, "estimate", "mean NIS", squares.t_s, mean)

@@ -170,7 +170,7 @@ class Group(NamedTuple):
     rows: tuple[tuple[str, float, tuple[tuple[str, str, str], ...]], ...]
 
 
-FAST = "fast part"  # of the receiver's error, drawn without a band
+FAST_PART = "fast part"  # of the receiver's error, drawn without a band
 DEGREES = 57.29577951308232
 EARTH = (("north", "n"), ("east", "e"), ("down", "d"))
 
@@ -198,7 +198,7 @@ GROUPS = (
         "Error of the GPS position",
         "What the filter takes the receiver's error to be: a part that wanders for minutes and one for seconds.",
         tuple(
-            (f"{title} (m)", 1.0, ((f"gps_slow_{a}_m", "slow part", "estimate"), (f"gps_fast_{a}_m", FAST, "gps")))
+            (f"{title} (m)", 1.0, ((f"gps_slow_{a}_m", "slow part", "estimate"), (f"gps_fast_{a}_m", FAST_PART, "gps")))
             for title, a in EARTH
         ),
     ),
@@ -247,7 +247,7 @@ def _panel(record: Record, group: Group) -> Panel | None:
             if state is None:
                 continue
             value, sigma = scale * state.value.T
-            if name != FAST:
+            if name != FAST_PART:
                 stack.band(row, "±3\N{GREEK SMALL LETTER SIGMA} stated", state.t_s, 3.0 * sigma, value)
             stack.line(row, role, name, state.t_s, value)
     chart = stack.chart(start_end_s(record), moments(record), outages(record))

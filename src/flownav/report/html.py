@@ -15,12 +15,11 @@ from flownav.report import (
     figures_errors,
     figures_filter,
     figures_innovation,
-    figures_path,
     figures_states,
     tables,
 )
 from flownav.report.chart import DOT_POINTS, LINE_POINTS
-from flownav.report.figures_path import Paths, paths_of
+from flownav.report.figures_states import Paths, paths_of
 from flownav.report.page_data import Columns, paths_data, sections_data
 from flownav.report.panels import Panel, Section
 from flownav.report.series import Window, first_pad_fix_s, has, mapping, moments, outages, start_end_s
@@ -81,7 +80,7 @@ def _sections(record: Record) -> list[tuple[str, str, list[Panel]]]:
     inner = figures_innovation.inner_states(record)
     vehicle = [figures_states.attitude(record), figures_states.controls(record), *figures_states.vibration(record)]
     return [
-        ("path", "Flight path", [figures_path.path_over_pad(record), figures_path.ground_track(record)]),
+        ("path", "Flight path", [figures_states.path_over_pad(record), figures_states.ground_track(record)]),
         ("close-ups", "Take-off, touchdown and outages", figures_errors.close_ups(record)),
         ("errors", "Errors", errors),
         ("uncertainty", "Uncertainty", uncertainty),

@@ -15,14 +15,14 @@ import numpy as np
 
 from flownav.core.measurement import Array
 from flownav.report.chart import CROSS_POINTS, DOT_POINTS, LINE_POINTS, Chart, Series, thin, thin_dots
-from flownav.report.figures_path import Paths, drawn_rows
+from flownav.report.figures_states import Paths, drawn_rows
 from flownav.report.panels import Section
 
-DIGITS = 6  # decimal places below the leading one of a column's largest value
+DECIMALS = 6  # decimal places below the leading one of a column's largest value
 FINEST_TIME_S = 1e-6
 MISSING = np.int64(-(2**31))  # stands for a value that is no number
 SMALLEST = 1e-200  # of a column's largest value: below it the column is zero
-LARGEST = 2.0e9  # of a whole number that a column holds
+LARGEST_WHOLE = 2.0e9  # of a whole number that a column holds
 
 
 class Columns:
@@ -38,7 +38,7 @@ class Columns:
         """Keep a column (n,) and give its number. time: of instants, to FINEST_TIME_S where they are not too large."""
         values = np.asarray(values, float)
         step = _step(values, time=time)
-        known = np.isfinite(values) & (np.abs(np.nan_to_num(values)) <= LARGEST * step)
+        known = np.isfinite(values) & (np.abs(np.nan_to_num(values)) <= LARGEST_WHOLE * step)
         whole = np.where(known, np.round(np.where(known, values, 0.0) / step), MISSING).astype(np.int64)
         packed = pack(whole)
         digest = hashlib.sha256(packed + str((step, len(values))).encode()).digest()
@@ -60,8 +60,8 @@ def _step(values: Array, *, time: bool) -> float:
     largest = float(finite.max()) if len(finite) else 0.0
     if largest < SMALLEST:
         return 1.0
-    finest = 10.0 ** math.ceil(math.log10(largest / LARGEST))
-    wanted = FINEST_TIME_S if time else 10.0 ** (math.floor(math.log10(largest)) - DIGITS)
+    finest = 10.0 ** math.ceil(math.log10(largest / LARGEST_WHOLE))
+    wanted = FINEST_TIME_S if time else 10.0 ** (math.floor(math.log10(largest)) - DECIMALS)
     return float(f"{max(finest, wanted):.0e}")
 
 

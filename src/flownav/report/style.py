@@ -126,7 +126,7 @@ def layout(height_px: int) -> dict[str, Any]:
 
 FRAME_HEIGHT_PX = 84
 GAP_PX = 22
-STILL = 1e-6  # an axis whose values differ by less is kept from magnifying their rounding
+LEAST_SPAN = 1e-6  # an axis whose values differ by less is kept from magnifying their rounding
 
 
 def figure(chart: Chart) -> Any:
@@ -206,7 +206,7 @@ def _layout(chart: Chart) -> dict[str, Any]:
         if one.within is not None:
             upright["range"] = [-one.within, one.within]
         smallest, largest = one.reach()
-        if largest - smallest < STILL:
+        if largest - smallest < LEAST_SPAN:
             upright |= {"range": [smallest - 1.0, largest + 1.0], "autorange": False}
         made[f"yaxis{row}"] = upright
     _shade(made, chart.outages)

@@ -10,23 +10,23 @@ Sums, not flights, are kept: memory does not grow with the number of flights.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.measurement import Array
+from flownav.core.measurement import Array, Sensor
 from flownav.scoring.errors import STATES
 
 SCORED = 6  # position and velocity, the degrees of freedom of a normalised error squared
 GROUP_FLIGHTS = 96  # flights whose mean is held against the band: the test is as sharp however many are flown
-BAND = 0.95  # probability of the chi-square band
+BAND_PROBABILITY = 0.95  # probability of the chi-square band
 AIRBORNE_SHARE = 0.9  # of the flights without contact: the step is one in flight
 SURE_99 = 2.5758293035489004  # standard deviations of a normal distribution that hold 99 % of it
 LITTLE_COLOUR = 0.2  # an autocorrelation that does no harm, however many readings prove that it is there
-MODEST = (0.5, 2.0)  # mean squares within which the stated errors are of the right size: a factor of 1.4 in the errors
+MODEST_SQUARES = (0.5, 2.0)  # mean squares: the stated errors are of the right size, to a factor of 1.4
 LEAST_SHARE = 0.01  # of the steps in flight: a height band with fewer says nothing
 HEIGHTS_M = (0.0, 0.3, 1.0, 3.5, np.inf)  # of the skids: between them lie the height bands
 
@@ -107,7 +107,7 @@ class InnovationConsistency(NamedTuple):
     white: bool
 
 
-def consistency_of(component: Array, innovation: Array, variance: Array) -> InnovationConsistency | None:
+def consistency_of(component: NDArray[Any], innovation: Array, variance: Array) -> InnovationConsistency | None:
     """Consistency of one sensor's tested components in order of time, (n,) each; None where none was tested.
 
     component: which of the sensor's values; each is held against the one before of its own kind. variance: of the
@@ -120,6 +120,19 @@ def consistency_of(component: Array, innovation: Array, variance: Array) -> Inno
     normal, kind = innovation[known] / np.sqrt(variance[known]), component[known]
     white = all(is_white(normal[kind == one]) for one in np.unique(kind))
     return InnovationConsistency(found.mean, found.tested, white)
+
+
+def consistency_by_sensor(
+    rows_of: Callable[[Sensor], NDArray[np.bool_]], component: NDArray[Any], innovation: Array, variance: Array
+) -> dict[str, dict[str, Any]]:
+    """The consistency of each sensor that has tested components, by its name. rows_of: which rows are a sensor's."""
+    found = {}
+    for sensor in Sensor:
+        rows = rows_of(sensor)
+        judged = consistency_of(component[rows], innovation[rows], variance[rows])
+        if judged is not None:
+            found[sensor.name.lower()] = judged._asdict()
+    return found
 
 
 def is_white(normalised: Array) -> bool:
@@ -137,9 +150,9 @@ def lag_one(normalised: Array) -> float:
 def verdict(nis_per_dof: float, *, white: bool) -> str:
     """What a sensor's innovations say of the filter, in words."""
     said = []
-    if nis_per_dof < MODEST[0]:
+    if nis_per_dof < MODEST_SQUARES[0]:
         said.append("pessimistic: errors are smaller than stated")
-    if nis_per_dof > MODEST[1]:
+    if nis_per_dof > MODEST_SQUARES[1]:
         said.append("optimistic: errors are larger than stated")
     if not white:
         said.append("coloured: errors last")
@@ -147,7 +160,7 @@ def verdict(nis_per_dof: float, *, white: bool) -> str:
 
 
 # -- many flights, by their errors -----------------------------------------------------------------------
-def chi_square_band(flights: int, probability: float = BAND) -> tuple[float, float]:
+def chi_square_band(flights: int, probability: float = BAND_PROBABILITY) -> tuple[float, float]:
     """Where the mean normalised error squared of `flights` independent flights lies with this probability.
 
     Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, section 5.4.2.

@@ -1,17 +1,20 @@
-"""The scores of a record, computed from its tables alone, of its own estimate or of another one put in its place."""
+"""The scores of a record, from its tables alone, of its own estimate or another one put in its place; and by phase."""
 
-from collections.abc import Mapping
-from typing import Any
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flownav.core.errors import InputError
 from flownav.core.measurement import COLUMNS, Array, Sensor
 from flownav.core.record import POSITION_NED, PROTECTION_LEVELS, QUATERNION, VELOCITY_BODY, Column, Record
-from flownav.scoring.consistency import consistency_of
+from flownav.scoring.consistency import consistency_by_sensor
 from flownav.scoring.errors import MAX_POSITION_ERROR, STATES, STATISTICS, score_block, scores_of_flight
 from flownav.scoring.landings import takeoff_of_flight, takeoffs
 from flownav.scoring.path import References, columns_of, end_drift_of, motion_of, path_scores, truth_motion
+from flownav.scoring.phases import Phase, phase_at
 from flownav.scoring.reference import drift_of, protection_of
 from flownav.scoring.touchdown import Limits, touchdowns
 from flownav.scoring.touchdown import motion_of as truth_in_motion
@@ -126,13 +129,29 @@ def _column(table: Mapping[str, Column], name: str) -> Array:
 # -- replays ---------------------------------------------------------------------------------------------------------
 def replay_scores(record: Record, estimate: Estimate) -> dict[str, Any]:
     """Errors of an estimate against what the record of a replay kept of its log."""
-    known = references_in(record)
-    return {
-        "duration_s": record.manifest["duration_s"],
+    known, judged = references_in(record), record.tables["judging"]
+    warned, t_s = np.asarray(judged["flagged"], float), np.asarray(judged["t_s"], float)
+    row = np.searchsorted(t_s, np.asarray(estimate["t_s"], float), side="right") - 1
+    standing = warned[np.clip(row, 0, len(warned) - 1)] > 0.0  # warnings are our own filter's
+    return estimate_scores(estimate, known, record.manifest["duration_s"], standing)
+
+
+def estimate_scores(
+    estimate: Estimate, known: References, duration_s: float, warned: NDArray[np.bool_]
+) -> dict[str, Any]:
+    """Errors of an estimate against what is known of its log. warned: at which of its instants a warning stands."""
+    scores: dict[str, Any] = {
+        "duration_s": duration_s,
         **path_scores(estimate, known),
         "end_drift_m": end_drift_of(motion_of(estimate), known),
-        "protection": _protection(record, estimate, known),
+        "protection": None,
     }
+    if set(PROTECTION_LEVELS) <= estimate.keys():  # else it states none
+        truth = None if known.truth is None else truth_motion(known.truth, known.heading)
+        drift = None if truth is None else drift_of(motion_of(estimate), truth, known.flight_s)
+        t_s = np.asarray(estimate["t_s"], float)
+        scores["protection"] = protection_of(t_s, columns_of(estimate, PROTECTION_LEVELS), warned, drift)
+    return scores
 
 
 def references_in(record: Record) -> References:
@@ -158,19 +177,6 @@ def _readings(record: Record, sensor: Sensor) -> tuple[Array, Array] | None:
     return None if table is None else (np.asarray(table["t_s"], float), columns_of(table, COLUMNS[sensor]))
 
 
-def _protection(record: Record, estimate: Estimate, known: References) -> dict[str, Any] | None:
-    """Protection levels against errors; None of an estimate that states no levels. Warnings are our own filter's."""
-    if not set(PROTECTION_LEVELS) <= estimate.keys():
-        return None
-    t_s, judged = np.asarray(estimate["t_s"], float), record.tables["judging"]
-    warned = np.asarray(judged["flagged"], float)
-    row = np.clip(np.searchsorted(np.asarray(judged["t_s"], float), t_s, side="right") - 1, 0, len(warned) - 1)
-    drift = None
-    if known.truth is not None:
-        drift = drift_of(motion_of(estimate), truth_motion(known.truth, known.heading), known.flight_s)
-    return protection_of(t_s, columns_of(estimate, PROTECTION_LEVELS), warned[row] > 0.0, drift)
-
-
 def consistency_in(record: Record) -> dict[str, dict[str, Any]]:
     """By sensor, whether the innovations of the components that were tested are as large as the filter states."""
     table = record.tables.get("innovation")
@@ -179,10 +185,95 @@ def consistency_in(record: Record) -> dict[str, dict[str, Any]]:
     sensor, tested = np.asarray(table["sensor"], str), np.isin(np.asarray(table["reason"], str), TESTED)
     component = np.unique(np.asarray(table["component"], str), return_inverse=True)[1]
     news, variance = (np.asarray(table[name], float) for name in ("innovation", "innovation_variance"))
-    found = {}
-    for each in Sensor:
-        rows = tested & (sensor == each.name.lower())
-        judged = consistency_of(component[rows], news[rows], variance[rows])
-        if judged is not None:
-            found[each.name.lower()] = judged._asdict()
-    return found
+    return consistency_by_sensor(lambda each: tested & (sensor == each.name.lower()), component, news, variance)
+
+
+class PhaseScores(NamedTuple):
+    """A phase's errors, NaN where they are not known, and of the values offered to the filter how many were not fused.
+
+    horizontal_rms_m, vertical_rms_m: of what was flown on, or else of the estimate, against the truth, or else GPS.
+    velocity_rms_m_s: of the length of the velocity's error.
+    """
+
+    phase: Phase
+    horizontal_rms_m: float
+    vertical_rms_m: float
+    velocity_rms_m_s: float
+    offered: int
+    rejected: int
+
+
+def scores_by_phase(record: Record, phases: Sequence[Phase]) -> list[PhaseScores]:
+    """A row for each phase. An instant on the border of two belongs to the later one."""
+    place, speed = errors_of(record, POSITION_NED), errors_of(record, VELOCITY_BODY)
+    table = record.tables.get("innovation", {})
+    t_s = np.asarray(table.get("t_s", ()), float)
+    fused = np.asarray(table.get("fused", np.ones(len(t_s))), float) > 0.5
+    rows = []
+    for k, phase in enumerate(phases):
+        last = k + 1 == len(phases)
+        horizontal, vertical, velocity = (
+            _rms(place, phase, slice(0, 2), last),
+            _rms(place, phase, slice(2, 3), last),
+            _rms(speed, phase, slice(0, 3), last),
+        )
+        here = _inside(t_s, phase, last)
+        rows.append(PhaseScores(phase, horizontal, vertical, velocity, int(here.sum()), int((here & ~fused).sum())))
+    return rows
+
+
+def rejected_mostly_in(record: Record, phases: Sequence[Phase]) -> dict[tuple[str, str], str]:
+    """By sensor and reason, the name of the phase in which most of its values were not fused."""
+    table = record.tables.get("innovation", {})
+    if not phases or not all(name in table for name in ("t_s", "sensor", "fused", "reason")):
+        return {}
+    rows = np.flatnonzero(np.asarray(table["fused"], float) < 0.5)
+    counted: dict[tuple[str, str], Counter[str]] = {}
+    for row in rows:
+        key = (str(table["sensor"][row]), str(table["reason"][row]))
+        counted.setdefault(key, Counter())[phase_at(list(phases), float(table["t_s"][row]))] += 1
+    return {key: names.most_common(1)[0][0] for key, names in counted.items()}
+
+
+def errors_of(record: Record, columns: tuple[str, ...]) -> tuple[Array, Array] | None:
+    """Instants (n,) and errors (n, 3) against the truth, of what was flown on or else of the estimate; without a truth
+    those of the position against GPS.
+    """
+    truth = record.tables.get("truth", {})
+    for name in ("flown", "estimate"):
+        table = record.tables.get(name, {})
+        if len(table.get("t_s", ())) and len(truth.get("t_s", ())) and all(c in table and c in truth for c in columns):
+            t_s, known = np.asarray(table["t_s"], float), np.asarray(truth["t_s"], float)
+            there = np.column_stack(
+                [np.interp(t_s, known, np.asarray(truth[c], float), np.nan, np.nan) for c in columns]
+            )
+            return t_s, record.matrix(name, columns) - there
+    return _against_gps(record, columns) if columns == POSITION_NED else None
+
+
+def _against_gps(record: Record, columns: tuple[str, ...]) -> tuple[Array, Array] | None:
+    """Errors against GPS, at the instants that it describes: its arrival less its delay."""
+    gps, estimate = record.tables.get("gps_position", {}), record.tables.get("estimate", {})
+    if not all(len(table.get("t_s", ())) and all(c in table for c in columns) for table in (gps, estimate)):
+        return None
+    delays: Any = record.manifest.get("delays_s")
+    delay_s = delays.get("gps_position") if isinstance(delays, Mapping) else None
+    t_s = np.asarray(gps["t_s"], float) - (float(delay_s) if isinstance(delay_s, (int, float)) else 0.0)
+    known = np.asarray(estimate["t_s"], float)
+    ours = np.column_stack([np.interp(t_s, known, estimate[c], np.nan, np.nan) for c in columns])
+    error = ours - record.matrix("gps_position", columns)
+    error[np.asarray(gps.get("quality", np.full(len(t_s), 255.0)), float) <= 0.0] = np.nan
+    return t_s, error
+
+
+def _rms(errors: tuple[Array, Array] | None, phase: Phase, columns: slice, last: bool) -> float:
+    if errors is None:
+        return float("nan")
+    t_s, error = errors
+    squares = (error[_inside(t_s, phase, last), columns] ** 2).sum(axis=1)
+    squares = squares[np.isfinite(squares)]
+    return float(np.sqrt(squares.mean())) if len(squares) else float("nan")
+
+
+def _inside(t_s: Array, phase: Phase, last: bool) -> NDArray[np.bool_]:
+    return (t_s >= phase.t0) & ((t_s <= phase.t1) if last else (t_s < phase.t1))

@@ -16,7 +16,7 @@ from flownav.sensors.flow import FlowParameters
 from flownav.sensors.gps_ins import GpsInsParameters
 from flownav.sensors.noise_law import NoiseFit, constant_noise
 from flownav.sensors.processes import gauss_markov_coefficients, second_order_hold, steps_per_unit
-from flownav.sensors.rangefinder import RangefinderParameters
+from flownav.sensors.range_sensor import RangefinderParameters
 
 
 class GpsInsSettings(ParameterModel):

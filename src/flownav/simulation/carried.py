@@ -17,9 +17,7 @@ from flownav.sensors.barometer import BarometerReading, BarometerSheet, draw_bar
 from flownav.sensors.camera_sheets import FlowCameraSheet, PadCameraSheet
 from flownav.sensors.flow_camera import draw_flow_camera, start_flow_camera
 from flownav.sensors.gps_receiver import GpsReceiverReading, draw_gps_receiver, start_gps_receiver, step_gps_receiver
-from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
 from flownav.sensors.inertial import InertialReading, draw_inertial, start_inertial
-from flownav.sensors.inertial_sheet import InertialSheet
 from flownav.sensors.magnetometer import (
     MagneticField,
     MagnetometerReading,
@@ -36,6 +34,7 @@ from flownav.sensors.range_sensor import (
     step_range_sensor,
 )
 from flownav.sensors.sheet import SensorSheet
+from flownav.sensors.sheets import GpsReceiverSheet, InertialSheet
 from flownav.sensors.skid_switch import SkidSwitchReading, SkidSwitchSheet, draw_skid_switch, start_skid_switch
 from flownav.simulation import onboard, seeing
 from flownav.simulation.seeing import told

@@ -29,7 +29,7 @@ Result = TypeVar("Result")
 
 SAID_OF_ONE = "the simulator, once, about 30 s"
 SAID_OF_MANY = "the simulator of many flights, once, about 40 s"
-AHEAD = 4  # blocks that each thread may be ahead of who takes their results
+BLOCKS_AHEAD = 4  # blocks that each thread may be ahead of who takes their results
 
 
 class Flown(NamedTuple):
@@ -172,7 +172,7 @@ def fly_blocks(
     count = threads or os.cpu_count() or 1
     with ThreadPoolExecutor(count) as pool:
         try:
-            yield from in_order(pool, fly, range(0, flights, len(LANES)), AHEAD * count)
+            yield from in_order(pool, fly, range(0, flights, len(LANES)), BLOCKS_AHEAD * count)
         except BaseException:  # Ctrl-C drops what has not begun
             pool.shutdown(wait=False, cancel_futures=True)
             raise

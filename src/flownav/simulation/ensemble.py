@@ -43,7 +43,7 @@ SHARED = (
 # tables that one kind of vehicle has and another has not
 OF_A_KIND = set(VehicleFile.model_fields) ^ set(MultirotorFile.model_fields)
 
-TOGETHER = 64  # flights whose numbers are drawn together
+LOT_FLIGHTS = 64  # flights whose numbers are drawn together
 
 
 def believed(flight: Flight) -> Truth:
@@ -122,20 +122,20 @@ class Ensemble:
 
     def values(self, seed: int, first: int, count: int) -> dict[str, list[float]]:
         """The dispersed numbers of the same flights, by dotted name, in the units of their names."""
-        numbers = range(first // TOGETHER, (first + count - 1) // TOGETHER + 1)
+        numbers = range(first // LOT_FLIGHTS, (first + count - 1) // LOT_FLIGHTS + 1)
         chunks = [self._chunk(seed, number) for number in numbers]
-        skipped = first - numbers[0] * TOGETHER
+        skipped = first - numbers[0] * LOT_FLIGHTS
         return {
             name: np.concatenate([chunk[name] for chunk in chunks])[skipped : skipped + count].tolist()
             for name in self.entries
         }
 
     def _drawn(self, seed: int, number: int) -> dict[str, Array]:
-        """The numbers of TOGETHER flights, the `number`-th such lot: SciPy takes as long for one as for all of them.
+        """The numbers of LOT_FLIGHTS flights, the `number`-th such lot: SciPy takes as long for one as for all of them.
 
         A flight stands at the same place of the same lot whoever asks for it, and so has the same bits.
         """
-        flights = range(number * TOGETHER, (number + 1) * TOGETHER)
+        flights = range(number * LOT_FLIGHTS, (number + 1) * LOT_FLIGHTS)
         spread = uniforms if self.design is None else self.design.uniforms
         return self.values_of({name: spread(seed, flights, name) for name in self.entries})
 

@@ -6,8 +6,7 @@ import numpy as np
 
 from flownav.control.autopilot import AutopilotState, Estimate, inner_loop, landing_logic, outer_loop
 from flownav.control.gains import AutopilotGains
-from flownav.control.go_around import Knowledge
-from flownav.control.guidance import Reference
+from flownav.control.go_around import Knowledge, Reference
 from flownav.core.compile import Lanes, Work, equation, invoke, procedure, replacing
 from flownav.core.frames import GRAVITY_M_S2, Quaternion, quaternion_product, rotation_from_quaternion
 from flownav.core.measurement import Sensor
@@ -15,7 +14,7 @@ from flownav.navigation.records import Reading
 from flownav.sensors.flow import FlowParameters, FlowState, misread, step_flow
 from flownav.sensors.geometry import Ground, ground_height
 from flownav.sensors.gps_ins import GpsInsErrors, attitude_with_error
-from flownav.sensors.rangefinder import slant_range
+from flownav.sensors.range_sensor import slant_range
 from flownav.simulation.block import Block, Progress
 from flownav.simulation.carriage import INERTIAL_FAULT, read_inertial
 from flownav.simulation.failing import Taken, strike

@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.control.autopilot import grounded, hovering
-from flownav.control.guidance import Reference, reference_at
+from flownav.control.go_around import Reference, reference_at
 from flownav.core.compile import Lanes, Work, equation, invoke, kernel, pointer, replacing
 from flownav.estimation import paper_filter
-from flownav.estimation.kalman import start
-from flownav.estimation.paper_filter import STATES, PaperModel
+from flownav.estimation.paper_filter import STATES, PaperModel, start
 from flownav.navigation.tape import output_of
 from flownav.sensors.gps_ins import NavSolution
 from flownav.simulation import layout, navigating

@@ -9,21 +9,19 @@ from typing import Any
 from flownav.control.autopilot import AutopilotState, Estimate
 from flownav.control.go_around import Knowledge
 from flownav.core.compile import Layout, lane_access
-from flownav.estimation.kalman import kalman_row_count, kalman_rows
-from flownav.estimation.paper_filter import STATES
+from flownav.estimation.paper_filter import STATES, kalman_row_count, kalman_rows
 from flownav.navigation.records import Reading
 from flownav.sensors.flow import FlowParameters, FlowReading, FlowState
 from flownav.sensors.gps_ins import GpsInsErrors, GpsInsNormals, NavSolution
 from flownav.sensors.inertial import ImuReading
-from flownav.sensors.rangefinder import RangefinderState, RangeReading
+from flownav.sensors.range_sensor import RangefinderState, RangeReading
 from flownav.simulation import records
 from flownav.simulation.ground import RecirculationState
 from flownav.simulation.seeing import attitude_of
 from flownav.simulation.truth import CARRIED, PARTS, SIZES
 from flownav.simulation.wind import WindNormals, WindState
-from flownav.vehicle.around import Around
 from flownav.vehicle.parameters import MultirotorParameters
-from flownav.vehicle.state import Controls, HelicopterState, Inflow, MultirotorState, Six
+from flownav.vehicle.state import Around, Controls, HelicopterState, Inflow, MultirotorState, Six
 
 
 def size_of(record: Any) -> int:

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.control.go_around import Knowledge
-from flownav.control.guidance import Reference
+from flownav.control.go_around import Knowledge, Reference
 from flownav.core.compile import Lanes, Work, equation, invoke, larger, procedure
 from flownav.core.frames import conjugate, quaternion_product, rotation_from_quaternion, to_body, to_earth
 from flownav.estimation.consistency import normalised_error
@@ -169,7 +168,7 @@ def put_on_truth(
 ) -> OnTruth:  # fmt: skip
     """The navigator's position, velocity and attitude become the truth at its horizon, for Jacobians to be taken there.
 
-    Its covariance is then that of the posterior Cramér-Rao bound along this flight (`estimation.bound`), for its model.
+    Its covariance is then that of the posterior Cramér-Rao bound along this flight, for its model.
     """
     running = start.started > 0.0 and reached
     return OnTruth(

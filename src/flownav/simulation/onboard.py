@@ -13,11 +13,10 @@ from flownav.core.frames import rotation_from_quaternion, to_earth
 from flownav.sensors.camera_sheets import AngleNoise, DistanceNoise, FlowCameraSheet, PadCameraSheet
 from flownav.sensors.flow import FlowParameters
 from flownav.sensors.geometry import BeamHit, Ground, beam_distance
-from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
-from flownav.sensors.inertial_sheet import InertialSheet
 from flownav.sensors.range_sensor import RangeSensorSheet
 from flownav.sensors.settings import GpsInsSettings, PadFixSettings, RangefinderSettings
 from flownav.sensors.sheet import Lever, SensorSheet
+from flownav.sensors.sheets import GpsReceiverSheet, InertialSheet
 from flownav.vehicle.state import HelicopterState
 
 EPOCH_S = 0.02

@@ -16,7 +16,7 @@ from flownav.sensors import gps_ins
 from flownav.sensors.flow import FlowParameters, FlowReading, FlowState, engage_flow, read_flow, start_flow
 from flownav.sensors.geometry import LensPose
 from flownav.sensors.inertial import ImuReading
-from flownav.sensors.rangefinder import (
+from flownav.sensors.range_sensor import (
     RangefinderParameters,
     RangefinderState,
     RangeReading,

@@ -18,9 +18,8 @@ from flownav.simulation.ground import (
 )
 from flownav.simulation.records import Loads
 from flownav.simulation.wind import WindNormals, WindParameters, WindState, WindVelocity, start_wind, step_wind
-from flownav.vehicle.around import CALM, Around
 from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters
-from flownav.vehicle.state import HelicopterState
+from flownav.vehicle.state import CALM, Around, HelicopterState
 
 Four = tuple[float, float, float, float]
 

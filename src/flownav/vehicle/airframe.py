@@ -12,10 +12,9 @@ import numpy as np
 
 from flownav.core.compile import equation, magnitude
 from flownav.core.frames import Rotation, Vector, rotation_from_quaternion, to_body
-from flownav.vehicle.around import Around
 from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters
 from flownav.vehicle.rotor import cosine_of_tilt, sine_of_tilt
-from flownav.vehicle.state import HelicopterState, MultirotorState
+from flownav.vehicle.state import Around, HelicopterState, MultirotorState
 
 AnyMotion = HelicopterState | MultirotorState  # their first fields are the same
 

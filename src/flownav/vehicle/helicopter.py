@@ -9,10 +9,20 @@ from typing import NamedTuple
 from flownav.core.compile import equation
 from flownav.core.frames import Rotation, Vector, quaternion_rate, to_earth
 from flownav.vehicle import airframe, drive, rotor
-from flownav.vehicle.around import Around, below_plane, plane_normal
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.skids import support, with_friction, with_support
-from flownav.vehicle.state import Controls, HelicopterState, Inflow, Outputs, RotorLoads, classical_step, normalised
+from flownav.vehicle.state import (
+    Around,
+    Controls,
+    HelicopterState,
+    Inflow,
+    Outputs,
+    RotorLoads,
+    below_plane,
+    classical_step,
+    normalised,
+    plane_normal,
+)
 
 
 class Rotors(NamedTuple):

@@ -29,11 +29,10 @@ from flownav.core.frames import rotation_from_quaternion, to_earth
 from flownav.core.measurement import Array
 from flownav.core.parameter_files import Number, ParameterModel, load, shipped
 from flownav.vehicle import airframe, helicopter, multirotor
-from flownav.vehicle.around import CALM
 from flownav.vehicle.complex_step import jacobian
 from flownav.vehicle.kinds import AnyState, AnyTrim, AnyVehicle
 from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters, with_inflow_held, without_slop
-from flownav.vehicle.state import Controls, HelicopterState, Inflow
+from flownav.vehicle.state import CALM, Controls, HelicopterState, Inflow
 from flownav.vehicle.trim import Trim, is_hexa
 
 STATES = ("x", "y", "z", "u", "v", "w")
@@ -133,15 +132,8 @@ class ReducedModel(NamedTuple):
 def load_paper_model(path: Path | None = None) -> ReducedModel:
     """The paper's model, or one of the same form from a file. InputError names file, key and what is allowed."""
     file = load(path or shipped(SHIPPED_MODEL), ReducedModelFile)
-    return ReducedModel(
-        states=file.states,
-        inputs=file.inputs,
-        a=np.array(file.A),
-        b=np.array(file.B),
-        r=np.diag(file.measurement_variance),
-        q=np.diag(file.process_variance),
-        update_rate_hz=file.update_rate_hz,
-    )
+    r, q = np.diag(file.measurement_variance), np.diag(file.process_variance)
+    return ReducedModel(file.states, file.inputs, np.array(file.A), np.array(file.B), r, q, file.update_rate_hz)
 
 
 FIELDS = HelicopterState._fields

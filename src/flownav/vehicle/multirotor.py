@@ -9,10 +9,21 @@ from typing import NamedTuple
 from flownav.core.compile import equation
 from flownav.core.frames import Vector, quaternion_rate, to_earth
 from flownav.vehicle import airframe, motors
-from flownav.vehicle.around import Around, below_plane, plane_normal
 from flownav.vehicle.parameters import MultirotorParameters
 from flownav.vehicle.skids import support, with_friction, with_support
-from flownav.vehicle.state import Controls, MultirotorState, Outputs, Six, moved, of_unit_attitude, speeds_of, total_of
+from flownav.vehicle.state import (
+    Around,
+    Controls,
+    MultirotorState,
+    Outputs,
+    Six,
+    below_plane,
+    moved,
+    of_unit_attitude,
+    plane_normal,
+    speeds_of,
+    total_of,
+)
 
 
 class RotorLoads(NamedTuple):

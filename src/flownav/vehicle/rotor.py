@@ -10,11 +10,12 @@ induced velocity. The main rotor's inflow takes time (`drive`); here is where it
 Ground effect is that on the main rotor's thrust (paper equation 11, read as Cheeseman and Bennett printed it).
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from flownav.core.compile import clamp, equation, larger, magnitude, smaller
+from flownav.core.compile import clamp, equation, larger, magnitude, smaller, write_function
 from flownav.vehicle.parameters import VehicleParameters
 
 HYPOTENUSE = 2.0 * (2.0**0.5 - 1.0)  # (a² + b² + this·a·b)/(a + b) is √(a² + b²), within 1 %
@@ -40,30 +41,16 @@ def speed_ratio(speed_rad_s: float, vehicle: VehicleParameters) -> float:
     return larger(speed_rad_s * vehicle.per_main_speed_s_rad, SLOWEST)
 
 
-@equation
-def main_rotor(vehicle: VehicleParameters, ratio: float) -> Rotor:
-    """The main rotor of a vehicle at a ratio of its governed speed."""
-    return Rotor(
-        vehicle.main_speed_rad_s * ratio,
-        vehicle.main_tip_speed_m_s * ratio,
-        vehicle.main_inflow_speed_m_s * ratio,
-        vehicle.main_thrust_slope_n_s_m * ratio,
-        vehicle.main_thrust_limit_n * (ratio * ratio),
-        vehicle.main_profile_torque_n_m * (ratio * ratio),
-    )
+def rotor_of(name: str) -> Callable[[VehicleParameters, float], Rotor]:
+    """An equation: a rotor of a vehicle at a ratio of the main rotor's governed speed, of the parameters so called."""
+    speeds, squares = Rotor._fields[:4], Rotor._fields[4:]
+    told = [f"vehicle.{name}_{field} * ratio" for field in speeds]
+    told += [f"vehicle.{name}_{field} * (ratio * ratio)" for field in squares]
+    text = f"def rotor(vehicle, ratio):\n    return Rotor({', '.join(told)})\n"
+    return equation(write_function("rotor", text, {"Rotor": Rotor}))
 
 
-@equation
-def tail_rotor(vehicle: VehicleParameters, ratio: float) -> Rotor:
-    """The tail rotor of a vehicle, geared to the main rotor at a ratio of its governed speed."""
-    return Rotor(
-        vehicle.tail_speed_rad_s * ratio,
-        vehicle.tail_tip_speed_m_s * ratio,
-        vehicle.tail_inflow_speed_m_s * ratio,
-        vehicle.tail_thrust_slope_n_s_m * ratio,
-        vehicle.tail_thrust_limit_n * (ratio * ratio),
-        vehicle.tail_profile_torque_n_m * (ratio * ratio),
-    )
+main_rotor, tail_rotor = rotor_of("main"), rotor_of("tail")
 
 
 @equation

@@ -132,19 +132,11 @@ def facts_of(sheet: MultirotorSheet) -> dict[str, Any]:
     hover = sheet.trim
     return {
         "vehicle": sheet.name,
-        "trim": {
-            "thrust_share": hover.controls.col,
-            **{name: getattr(hover, name) for name in ROTORS_TRIM_SHOWN},
-        },
+        "trim": {"thrust_share": hover.controls.col} | {name: getattr(hover, name) for name in ROTORS_TRIM_SHOWN},
         "full_thrust_n": sheet.vehicle.rotor_count * full_thrust(sheet.vehicle),
         "forward": [
-            {
-                "speed_m_s": speed,
-                "pitch_rad": trim.pitch_rad,
-                "thrust_share": trim.controls.col,
-                "power_w": trim.power_w,
-            }
-            for speed, trim in sheet.forward
+            {"speed_m_s": speed, "pitch_rad": at.pitch_rad, "thrust_share": at.controls.col, "power_w": at.power_w}
+            for speed, at in sheet.forward
         ],
         "near_ground": [{"z_over_R": ratio, "thrust_share": share} for ratio, share in sheet.near_ground],
     }

@@ -1,6 +1,6 @@
 """Skid contact with the ground: four unilateral sprung feet, and dry friction that really sticks.
 
-The ground is a plane, level or not, and what each foot finds over it (a step, a stone): `around.Around`.
+The ground is a plane, level or not, and what each foot finds over it (a step, a stone): `state.Around`.
 
 The feet push and never pull. Their damping comes in over the first 2 mm, so the force has no jump at touch.
 
@@ -18,8 +18,8 @@ import numpy as np
 from flownav.core.compile import clamp, equation, larger, smaller, squared
 from flownav.core.frames import Vector
 from flownav.vehicle.airframe import Wrench
-from flownav.vehicle.around import Around
 from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters
+from flownav.vehicle.state import Around
 
 OnFeet = VehicleParameters | MultirotorParameters
 
@@ -47,7 +47,7 @@ def foot_force(depth: float, sink: float, vehicle: OnFeet) -> float:
 def support(below: float, normal: Vector, velocity: Vector, rates: Vector, around: Around, vehicle: OnFeet) -> Support:
     """The normal forces of the four feet at (±half_length, ±half_track, cg_above_skid), body axes.
 
-    below: of the centre of gravity under the ground's plane [m] (`around.below_plane`), normal: into the ground, body
+    below: of the centre of gravity under the ground's plane [m] (`state.below_plane`), normal: into the ground, body
     axes. A foot at r is below·cosine + normal·r deep, and what it finds over the plane; it sinks at
     normal·(velocity + rates × r).
     """

@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 from flownav.core.errors import InputError
 from flownav.core.frames import Vector, quaternion_from_euler
 from flownav.vehicle import airframe, helicopter, multirotor
-from flownav.vehicle.around import CALM
 from flownav.vehicle.complex_step import solve, value
 from flownav.vehicle.feasibility import hover_induced_velocity, hover_pitch
 from flownav.vehicle.motors import battery_voltage
 from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters, hover_speed
-from flownav.vehicle.state import Controls, HelicopterState, MultirotorState
+from flownav.vehicle.state import CALM, Controls, HelicopterState, MultirotorState
 
 OUT_OF_GROUND_EFFECT_M = 1e6
 TOLERANCE = 1e-11  # [m/s2, rad/s2, rad/s]

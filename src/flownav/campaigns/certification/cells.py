@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from flownav.campaigns.faults.catalogue import FAULTS, NOT_FLOWN
 from flownav.campaigns.faults.flown import law_of_flight
 from flownav.campaigns.measures import MEASURES, NOT_LANDED
-from flownav.campaigns.plan import INSIDE, Cell, Plan, lands
+from flownav.campaigns.plan import EDGE_MARGIN, Cell, Plan, lands
 from flownav.campaigns.requirement import NO_FAULT, OWN_SENSOR, Requirement, fixed_by, scenario_of
 from flownav.campaigns.store import PLAN, plan_in
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.parameter_files import check
 from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario
@@ -69,12 +69,12 @@ def require_planned(plan: Plan, folder: Path) -> None:
     if asked is not None and list(asked) != list(plan.asked):
         raise InputError(
             f"{folder}: was flown for {'; '.join(map(str, asked))}; to judge its flights by something else takes more "
-            "risk than is stated: give another --out, and another seed in the requirement"
+            "risk than is stated: give another folder, and another seed in the requirement"
         )
     if planned != plan.flights:
         raise InputError(
             f"{folder}: was planned with {planned} flights a cell, not {plan.flights}; to add flights until they pass "
-            "takes more risk than is stated: give another --out, and another seed in the requirement"
+            "takes more risk than is stated: give another folder, and another seed in the requirement"
         )
 
 
@@ -86,7 +86,7 @@ def cells_of(requirement: Requirement, vehicle: str | None = None) -> tuple[Cell
     conditions = requirement.conditions
     if vehicle is not None and conditions.vehicle:
         raise InputError(
-            f"--vehicle {vehicle}: {requirement.name} names vehicles in its conditions; leave one of the two out"
+            f"{arg('vehicle')} {vehicle}: {requirement.name} names vehicles in its conditions; leave one of the two out"
         )
     lists: dict[str, tuple[Any, ...]] = {
         "vehicle": conditions.vehicle,
@@ -112,7 +112,7 @@ def _cell(requirement: Requirement, values: dict[str, Any], vehicle: str | None)
     failure = _failure(requirement, scenario, values.get("fault", NO_FAULT))
     cell = Cell(scenario, values, "ensemble", fixed=tuple(fixed_by(requirement)), failure=failure)
     names = tuple(requirement.conditions.ranges)
-    for share in (INSIDE, 1.0 - INSIDE):  # what cannot be is said now
+    for share in (EDGE_MARGIN, 1.0 - EDGE_MARGIN):  # what cannot be is said now
         cell.setup.ensemble(Ends(names, share)).truths(requirement.seed, 0, 1)
     return cell
 

@@ -24,7 +24,7 @@ from flownav.core.measurement import Array
 from flownav.core.text import finite
 from flownav.simulation.dispersion import Design
 
-TOLD = 10  # flights that are named as the worst
+FLIGHTS_TOLD = 10  # flights that are named as the worst
 
 
 @dataclass(frozen=True)
@@ -165,7 +165,7 @@ def worst_of(requirement: Requirement, rows: Array) -> tuple[int, ...]:
     figures = bad_first(table, measured(table.measure, rows))
     badness = figures if table.upper else -figures
     order = np.lexsort((np.arange(len(rows)), -badness, -failing(requirement, rows).sum(axis=0)))
-    return tuple(int(flight) for flight in order[:TOLD])
+    return tuple(int(flight) for flight in order[:FLIGHTS_TOLD])
 
 
 # -- the ranking -------------------------------------------------------------------------------------------------

@@ -25,7 +25,7 @@ from flownav.core.measurement import Array
 from flownav.core.text import finite_or_none
 from flownav.simulation.ensemble import Ensemble
 
-PLANS = (0, 1, 2)  # failures of the plans that are told
+PLAN_FAILURES = (0, 1, 2)  # failures of the plans that are told
 
 
 class Judgement(NamedTuple):
@@ -34,7 +34,7 @@ class Judgement(NamedTuple):
     most: failures with which these flights would still pass, -1: none. share: one-sided bounds of the share that
     succeeds. risk: how likely these flights pass when the requirement is only just not met. bound: the tolerance bound
     of the measure, infinite where the flights give none, None of a measure that says yes or no. needs: flights by
-    failures, for PLANS.
+    failures, for PLAN_FAILURES.
     """
 
     table: RequirementTable
@@ -68,7 +68,7 @@ class Judgement(NamedTuple):
             "risk": self.risk,
             "tolerance_bound": finite_or_none(self.bound),
             "yes_or_no": table.yes_or_no,
-            "needed": {str(failures): count for failures, count in zip(PLANS, self.needs, strict=True)},
+            "needed": {str(failures): count for failures, count in zip(PLAN_FAILURES, self.needs, strict=True)},
             "more": self.more(),
         }
 
@@ -107,7 +107,7 @@ def judged(table: RequirementTable, rows: Array) -> Judgement:
         share=interval(flights, failures, table.confidence),
         risk=risk(flights, most, table.probability),
         bound=bound,
-        needs=tuple(needed_by(table, count) for count in PLANS),
+        needs=tuple(needed_by(table, count) for count in PLAN_FAILURES),
     )
 
 
@@ -125,8 +125,8 @@ def bad_first(table: RequirementTable, figures: Array) -> Array:
 # -- the envelope ------------------------------------------------------------------------------------------------
 WIND = (SPEED, DIRECTION)
 GRIDS = ((6, 12), (5, 8), (4, 8), (4, 4), (3, 4), (2, 4))  # fields of the first axis and the second, finest first
-USEFUL = 50  # flights of a field that say something, where there are too few to show the requirement
-EDGE = 1e-3  # share of a distribution that the outermost edge leaves out, where it has no end
+USEFUL_FLIGHTS = 50  # flights of a field that say something, where there are too few to show the requirement
+EDGE_SHARE = 1e-3  # share of a distribution that the outermost edge leaves out, where it has no end
 
 
 def axes_of(requirement: Requirement, ensemble: Ensemble) -> tuple[str, ...]:
@@ -183,13 +183,13 @@ def _grid(requirement: Requirement, flights: int, axes: int) -> Sequence[int]:
     needs = max(needed_by(table, 0) for table in requirement.requirement)
     fields = [int(np.prod(grid[:axes])) for grid in GRIDS]
     enough = [grid for grid, count in zip(GRIDS, fields, strict=True) if flights >= 1.25 * needs * count]
-    some = [grid for grid, count in zip(GRIDS, fields, strict=True) if flights >= USEFUL * count]
+    some = [grid for grid, count in zip(GRIDS, fields, strict=True) if flights >= USEFUL_FLIGHTS * count]
     return (*enough, *some, GRIDS[-1])[0]
 
 
 def _edges(ensemble: Ensemble, name: str, count: int) -> Array:
     """Edges of fields that flights fall into equally often, (count + 1,)."""
     found = ensemble.frozen[name].support()
-    low = 0.0 if np.isfinite(found[0]) else EDGE
-    high = 1.0 if np.isfinite(found[1]) else 1.0 - EDGE
+    low = 0.0 if np.isfinite(found[0]) else EDGE_SHARE
+    high = 1.0 if np.isfinite(found[1]) else 1.0 - EDGE_SHARE
     return np.sort(ensemble.numbers(name, np.linspace(low, high, count + 1)))

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from flownav.campaigns.faults import inject
 from flownav.campaigns.faults.inject import Injector, struck
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Sensor, Stream
 from flownav.sensors.settings import RangefinderSettings
 from flownav.simulation.layout import EARLIER_READINGS
@@ -129,7 +129,7 @@ def faults_named(names: Iterable[str]) -> tuple[Fault, ...]:
     names = tuple(names)
     for name in names:
         if name not in FAULTS:
-            raise InputError(f"--faults {name}: no such fault; there are {', '.join(FAULTS)}")
+            raise InputError(f"{arg('faults')} {name}: no such fault; there are {', '.join(FAULTS)}")
     return tuple(FAULTS[name] for name in names)
 
 

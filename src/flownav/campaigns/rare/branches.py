@@ -138,7 +138,9 @@ def read_branch(path: Path, setup: Setup) -> Branch:
         if found["scenario"] != setup.scenario.name:
             raise InputError(f"{path}: a flight of the scenario {found['scenario']}, not of {setup.scenario.name}")
         if found["parameters_sha256"] != made_of(setup):
-            raise InputError(f"{path}: was flown with other settings; give the options with which --rare was run")
+            raise InputError(
+                f"{path}: was flown with other settings; give the options with which `flownav campaign --rare` was run"
+            )
         if sum(int(spans) for _, spans in found["streams"]) > MOST_SPANS:
             raise ValueError("too long")
         streams = [int(stream) for stream, spans in found["streams"] for _ in range(int(spans))]
@@ -147,7 +149,9 @@ def read_branch(path: Path, setup: Setup) -> Branch:
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{path}: no flight of a rare event; give the rare_flight.json of --rare") from error
+        raise InputError(
+            f"{path}: no flight of a rare event; give the rare_flight.json of `flownav campaign --rare`"
+        ) from error
     space = Space(setup, branch.seed, dispersed=bool(drawn))
     if set(drawn) != set(space.dispersed) or set(start) != {one.name for one in space.starts}:
         raise InputError(f"{path}: a flight of another scenario: other numbers are drawn for it")

@@ -10,10 +10,10 @@ from flownav.campaigns.measures import Event
 from flownav.campaigns.rare import walk
 from flownav.campaigns.rare.branches import Branch, Space
 from flownav.campaigns.rare.likely import Response, effective, rank_inputs, rank_noise, responses_to
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 from flownav.core.text import finite_or_none
-from flownav.scoring.percentiles import share_with_interval
+from flownav.scoring.landings import share_with_interval
 from flownav.scoring.touchdown import Limits
 from flownav.simulation.assemble import Setup
 
@@ -24,7 +24,7 @@ ISLANDS, ISLAND_FLIGHTS = 8, 512  # a level: 512 walks side by side, and seven d
 DIRECT_FLIGHTS = 4096  # at once, where there are no levels to climb
 FAR = 3.7  # -ln((1 - CONFIDENCE) / 2): none of n flights shows that the probability is below FAR / n
 NEGLIGIBLE, SMALL = 0.02, 0.1  # of the event's other part: not worth flights, or not worth more of them
-LEAST = 1e-9  # no probability below that is sought
+LEAST_PROBABILITY = 1e-9  # no probability below that is sought
 PILOTS_FACTOR = 5.0  # a pilot's own estimate is seldom so many times too small
 
 
@@ -52,7 +52,7 @@ def find(walker: walk.Walker, limit: float, most: int, beside: float = 0.0) -> F
     up. beside: the probability of the event's other part: where the pilot finds next to nothing beside it, or at all,
     it is left at that, and the probability counts as 0 with what it may be as `high`.
     """
-    negligible = max(NEGLIGIBLE * beside, LEAST)
+    negligible = max(NEGLIGIBLE * beside, LEAST_PROBABILITY)
     ladder = walk.climb(walker, limit, PILOT_FLIGHTS, most // 2, negligible)
     if not ladder.reached and ladder.above < negligible:
         levels, high = tuple((level, np.nan) for level in ladder.levels), PILOTS_FACTOR * ladder.above
@@ -60,9 +60,9 @@ def find(walker: walk.Walker, limit: float, most: int, beside: float = 0.0) -> F
     if not ladder.reached:
         return at_random(walker, limit, most - walker.flown)
     price = ISLANDS * (
-        1.0 + (len(ladder.levels) - 1) * (1.0 - 1.0 / walk.WALK)
+        1.0 + (len(ladder.levels) - 1) * (1.0 - 1.0 / walk.WALK_STATES)
     )  # of a flight of every island and level
-    count = min(int((most - walker.flown) / price) // walk.WALK * walk.WALK, ISLAND_FLIGHTS)
+    count = min(int((most - walker.flown) / price) // walk.WALK_STATES * walk.WALK_STATES, ISLAND_FLIGHTS)
     lots: list[walk.Islands] = []
     while True:
         lots.append(walk.fly_islands(walker, ladder, ISLANDS, count))
@@ -183,7 +183,7 @@ def estimate_rare(
     is the same on any number of threads. InputError where `flights` is too small, or as `Ensemble`.
     """
     if flights < FEWEST_FLIGHTS:
-        raise InputError(f"--flights {flights}: a rare event needs {FEWEST_FLIGHTS} or more")
+        raise InputError(f"{arg('flights')} {flights}: a rare event needs {FEWEST_FLIGHTS} or more")
     space = Space(setup, seed, dispersed=dispersed)
     responses = responses_to(event, Limits(**setup.flight.limits._asdict()), space.usual(USUAL_FLIGHTS, threads))
     on_progress(USUAL_FLIGHTS)
@@ -219,7 +219,7 @@ def _respond(
 def differences(space: Space, found: list[Found]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """How the inputs and the noise of the event's flights differ from those of all flights."""
     beyond, weights = walk.together([part.beyond for part in found]), np.concatenate([part.weights for part in found])
-    independent = effective(weights) / walk.WALK
+    independent = effective(weights) / walk.WALK_STATES
     inputs = rank_inputs(space.names, beyond.inputs, weights, independent)
     noise = rank_noise(space.flight, space.seed, beyond, weights, independent)
     return inputs, noise

@@ -46,7 +46,7 @@ class Response(NamedTuple):
 
 HARD = "the touchdown's hardest figure, of the way from its median to its limit: sink rate, lateral speed, tilt, yaw " \
     "rate or slide"  # fmt: skip
-NEAREST = 0.9  # of a limit: where the median is beyond it, the event is not rare
+NEAREST_SHARE = 0.9  # of a limit: where the median is beyond it, the event is not rare
 
 
 def responses_to(event: Event, limits: Limits, usual: Array) -> list[Response]:
@@ -95,7 +95,7 @@ def severity(rows: Array, limits: Limits, typical: Array, failed: NDArray[np.boo
     Above 1 exactly where it `failed`, infinite where no limit on the touchdown says why. A figure that is large in
     every flight, as the tilt in trim is, thereby says nothing until it grows. 0 where nothing was touched.
     """
-    begins = np.minimum(typical, NEAREST)
+    begins = np.minimum(typical, NEAREST_SHARE)
     on_the_way = (figures(rows, limits) - begins) / (1.0 - begins)
     worst = np.where(np.isfinite(on_the_way), on_the_way, 0.0).max(axis=1)
     return np.where(failed, np.where(worst > 1.0, worst, np.inf), np.minimum(worst, 1.0))

@@ -96,9 +96,9 @@ def ancestors(rng: np.random.Generator, beyond: NDArray[np.int64], count: int) -
 
 
 # -- levels and islands ------------------------------------------------------------------------------------------
-WALK = 8  # states of a walk, its first among them: one in so many flights is beyond the next level
+WALK_STATES = 8  # states of a walk, its first among them: one in so many flights is beyond the next level
 LARGEST_SHARE = 0.5  # of the flights beyond a level, where its ties allow
-SIZES = np.array([0.02, 0.05, 0.1, 0.2, 0.4, 0.8])  # of steps, that a pilot tries
+STEP_SIZES = np.array([0.02, 0.05, 0.1, 0.2, 0.4, 0.8])  # of steps, that a pilot tries
 
 
 class Ladder(NamedTuple):
@@ -129,11 +129,11 @@ class Islands(NamedTuple):
 
 
 def next_level(response: Array, limit: float) -> float | None:
-    """The level that one in WALK of the flights exceeds, or where they are tied about as many; the limit at most.
+    """The level that one in WALK_STATES flights exceeds, or where they are tied about as many; the limit at most.
 
     None where no level lies between them.
     """
-    share = 1.0 / WALK
+    share = 1.0 / WALK_STATES
     if np.mean(response > limit) >= share:
         return limit
     values, counts = np.unique(response[response <= limit], return_counts=True)
@@ -158,25 +158,25 @@ def climb(walker: Walker, limit: float, count: int, most: int, negligible: float
         levels.append(level)
         if level == limit or walker.flown >= most or above < negligible:
             return Ladder(tuple(levels), tuple(sizes), above, level == limit)
-        first = ancestors(walker.rng, np.flatnonzero(states.response > level), count // WALK)
+        first = ancestors(walker.rng, np.flatnonzero(states.response > level), count // WALK_STATES)
         states, size = learn(walker, states.at(first), level)
         sizes.append(size)
 
 
 def learn(walker: Walker, states: States, level: float) -> tuple[States, float]:
-    """WALK states of each walk with steps of all SIZES, and the size that leads farthest: times the share taken."""
-    walked, tried, went = [states], np.zeros(len(SIZES)), np.zeros(len(SIZES))
-    for _ in range(WALK - 1):
-        size = walker.rng.permutation(np.arange(len(states.response)) % len(SIZES))
-        states, taken = walker.step(states, level, SIZES[size])
+    """States of walks with steps of all STEP_SIZES, and the size that leads farthest: times the share taken."""
+    walked, tried, went = [states], np.zeros(len(STEP_SIZES)), np.zeros(len(STEP_SIZES))
+    for _ in range(WALK_STATES - 1):
+        size = walker.rng.permutation(np.arange(len(states.response)) % len(STEP_SIZES))
+        states, taken = walker.step(states, level, STEP_SIZES[size])
         walked.append(states)
-        tried += np.bincount(size, minlength=len(SIZES))
-        went += np.bincount(size[taken], minlength=len(SIZES))
-    return together(walked), float(SIZES[np.argmax(SIZES * went / np.maximum(tried, 1.0))])
+        tried += np.bincount(size, minlength=len(STEP_SIZES))
+        went += np.bincount(size[taken], minlength=len(STEP_SIZES))
+    return together(walked), float(STEP_SIZES[np.argmax(STEP_SIZES * went / np.maximum(tried, 1.0))])
 
 
 def fly_islands(walker: Walker, ladder: Ladder, islands: int, count: int) -> Islands:
-    """Islands of `count` flights a level, a multiple of WALK."""
+    """Islands of `count` flights a level, a multiple of WALK_STATES."""
     states, island = walker.fresh(islands * count), np.repeat(np.arange(islands), count)
     shares = np.zeros((islands, len(ladder.levels)))
     for k, level in enumerate(ladder.levels):
@@ -185,16 +185,16 @@ def fly_islands(walker: Walker, ladder: Ladder, islands: int, count: int) -> Isl
         if k + 1 == len(ladder.levels) or not above.any():
             break
         own = [np.flatnonzero(above & (island == i)) for i in range(islands)]
-        first = [ancestors(walker.rng, beyond, count // WALK) for beyond in own if len(beyond)]
+        first = [ancestors(walker.rng, beyond, count // WALK_STATES) for beyond in own if len(beyond)]
         index = np.concatenate(first)
-        states, island = walk(walker, states.at(index), level, ladder.sizes[k]), np.tile(island[index], WALK)
+        states, island = walk(walker, states.at(index), level, ladder.sizes[k]), np.tile(island[index], WALK_STATES)
     return Islands(shares, states.at(np.flatnonzero(above)), island[above])
 
 
 def walk(walker: Walker, states: States, level: float, size: float) -> States:
-    """WALK states of each walk, the first where it begins."""
+    """WALK_STATES states of each walk, the first where it begins."""
     walked = [states]
-    for _ in range(WALK - 1):
+    for _ in range(WALK_STATES - 1):
         states, _ = walker.step(states, level, np.full(len(states.response), size))
         walked.append(states)
     return together(walked)

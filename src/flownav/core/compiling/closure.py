@@ -26,7 +26,7 @@ START_S = time.time()
 WITHOUT_CODE = {
     "flownav.core.files",
     "flownav.core.guard",
-    *(f"flownav.core.compiling.{part}" for part in ("beside", "cache", "closure", "progress", "runner", "shipping")),
+    *(f"flownav.core.compiling.{part}" for part in ("beside", "cache", "closure", "progress")),
 }
 
 

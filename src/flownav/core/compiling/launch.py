@@ -21,8 +21,7 @@ from flownav.core.compiling.bundles import write_function
 from flownav.core.compiling.cache import STORE, SUFFIX, KernelCache
 from flownav.core.compiling.device import Capability, DeviceCode, call_instead, compile_for_device
 from flownav.core.compiling.progress import compiling
-from flownav.core.compiling.runner import Constants, NoDeviceError
-from flownav.core.compiling.strided import WARP
+from flownav.core.compiling.strided import WARP, Constants, NoDeviceError
 
 THREADS = 64  # of a block
 SIMULATED_BYTES = 1 << 30

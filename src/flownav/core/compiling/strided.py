@@ -1,4 +1,4 @@
-"""Pointers with a stride: the rows of one flight among those of a warp, on a CUDA device.
+"""Functions of one thread that are run by many: what is asked of a device, and pointers with a stride to its rows.
 
 Thirty-two threads that fly side by side read the same row at the same time. Their rows lie as those of lanes do:
 row `r` of thread `k` at `r * WARP + k`, so that a warp reads a row as one piece of memory. The equations know nothing
@@ -7,7 +7,8 @@ of it: they fly `ONE_LANE`, whose row `r` is `work[r]`.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,3 +110,31 @@ def _teach_code(strided_type: Any) -> None:
     lower_builtin(strided, types.Array, types.Integer)(lower_address)
     lower_builtin(operator.getitem, strided_type, types.Integer)(lower_load)
     lower_builtin(operator.setitem, strided_type, types.Integer, types.Float)(lower_store)
+
+
+Constants = dict[str, Any]
+
+
+class NoDeviceError(Exception):
+    """There is no CUDA device to run on; why, in a few words."""
+
+
+class Runner(Protocol):
+    """Threads, and the memory that they work on. in_python: functions are run as plain Python."""
+
+    in_python: bool
+
+    def free_bytes(self) -> int:
+        """How much of its memory is free."""
+
+    def put(self, value: Any) -> Any:
+        """A copy of a contiguous array in the device's memory; of a tuple one with copies of its arrays."""
+
+    def new(self, shape: tuple[int, ...], dtype: Any) -> Any:
+        """An array in the device's memory, whatever lies there."""
+
+    def fetch(self, array: Any) -> Any:
+        """A NumPy copy of a device's array."""
+
+    def run(self, function: Callable[..., None], threads: int, told: dict[str, Any], constants: Constants) -> None:
+        """`function(thread, threads, **told, **constants)` for each thread; arrays in `told` are the device's."""

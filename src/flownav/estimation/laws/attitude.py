@@ -7,7 +7,7 @@ import numpy as np
 from flownav.core.compile import arctan2, equation, larger
 from flownav.core.frames import Quaternion, Vector, conjugate, quaternion_product, within_half_turn
 from flownav.estimation.law import law
-from flownav.estimation.laws.geometry import LEAST_UPRIGHT, component
+from flownav.estimation.laws import LEAST_UPRIGHT, component
 from flownav.estimation.named import Attitude, InsError, ReadAttitude, rotation_by
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 from flownav.core.compile import equation
 from flownav.core.frames import flow_about
 from flownav.estimation.law import law
-from flownav.estimation.laws.geometry import along_axis, component, cross, lens_range
+from flownav.estimation.laws import along_axis, component, cross, lens_range
 from flownav.estimation.named import Attitude, BodyRate, FlowMount, GyroLeft, Height, Lever, VelocityNed, rotation_by
 
 

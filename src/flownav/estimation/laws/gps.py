@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from flownav.core.frames import GRAVITY_M_S2, to_earth
 from flownav.estimation.law import law
-from flownav.estimation.laws.geometry import component, cross, turning
+from flownav.estimation.laws import component, cross, turning
 from flownav.estimation.named import Attitude, BodyRate, Lever, rotation_by
 
 

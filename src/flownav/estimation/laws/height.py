@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from flownav.core.compile import larger
 from flownav.estimation.law import law
-from flownav.estimation.laws.geometry import LEAST_UPRIGHT
+from flownav.estimation.laws import LEAST_UPRIGHT
 from flownav.estimation.named import Attitude, Beam, Height, rotation_by
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from flownav.core.compile import equation
 from flownav.core.frames import Vector, to_body, to_earth
 from flownav.estimation.law import law
-from flownav.estimation.laws.geometry import cross
+from flownav.estimation.laws import cross
 from flownav.estimation.named import Attitude, Beam, PadNed, PositionNed, ReadSight, rotation_by
 
 

@@ -28,7 +28,7 @@ FMT, FIRST_OWN = 128, 132  # types of messages: FMT's, and of those that a log d
 BOOT_S = 20.0  # the vehicle's time since boot when the log's time 0 is
 GOOD, DOWNWARD, FIX_3D = 4, 25, 3
 LANDED, FLYING = 18, 28  # LogEvent
-MILLIGAUSS = 1e3
+MILLIGAUSS_PER_GAUSS = 1e3
 SIMULATED_EVERY = 2  # rows of the truth
 
 
@@ -145,7 +145,7 @@ def _rows(log: Log) -> Iterator[Row]:
     for t_s, (altitude,) in _of(log, Sensor.BARO):
         yield Row(t_s, "BARO", (0, altitude))
     for t_s, field in _of(log, Sensor.MAG):
-        yield Row(t_s, "MAG", (0, *(round(MILLIGAUSS * part) for part in field), 1))
+        yield Row(t_s, "MAG", (0, *(round(MILLIGAUSS_PER_GAUSS * part) for part in field), 1))
     yield from _fixes(log)
     for t_s, landed in zip(*(column.tolist() for column in changes(log)), strict=True):
         yield Row(t_s, "EV", (LANDED if landed else FLYING,))

@@ -7,13 +7,13 @@ import numpy as np
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, QUATERNION, Table
 from flownav.export.samples.flight import changes, fixes_of, velocities_ned
-from flownav.export.tables import Stamps, stamps
+from flownav.export.trajectory import Stamps, stamps
 from flownav.export.ulog_topics import Field, Topic, assembled
 from flownav.logs.log import Log
 
 BOOT_S = 20.0  # the vehicle's time since boot when the log's time 0 is
-US = 1e6
-DOWNWARD = 25  # MAV_SENSOR_ROTATION_PITCH_270
+US_PER_S = 1e6
+DOWNWARD_ROTATION = 25  # MAV_SENSOR_ROTATION_PITCH_270
 SYSTEM = "flownav simulator"
 
 
@@ -37,7 +37,7 @@ def topics_of(log: Log) -> list[Topic]:
 
 
 def _us(t_s: Array) -> Stamps:
-    return stamps(t_s, US, BOOT_S)
+    return stamps(t_s, US_PER_S, BOOT_S)
 
 
 def _sampled(stream: Stream) -> Field:
@@ -53,8 +53,8 @@ def _inertial(log: Log) -> Topic:
 def _flow(log: Log) -> Topic:
     """Angles over the time since the last reading; the camera's gyro has no third axis."""
     stream, limits = log.streams[Sensor.FLOW_RATE], log.limits
-    span_us = np.rint(US * np.median(np.diff(stream.t_s))) * np.ones(len(stream))
-    seen = stream.value * (span_us / US)[:, None]
+    span_us = np.rint(US_PER_S * np.median(np.diff(stream.t_s))) * np.ones(len(stream))
+    seen = stream.value * (span_us / US_PER_S)[:, None]
     none = np.full(len(stream), np.nan)
     fixed = {
         "max_flow_rate": limits["flow_rad_s"][1],
@@ -80,7 +80,7 @@ def _range(log: Log) -> Topic:
         Field("float", "max_distance", most),
         Field("float", "variance", np.nan_to_num(stream.variance[:, 0])),
         Field("int8_t", "signal_quality", np.where(stream.quality > 0.0, 100, 0)),
-        Field("uint8_t", "orientation", np.full(len(stream), DOWNWARD)),
+        Field("uint8_t", "orientation", np.full(len(stream), DOWNWARD_ROTATION)),
     ])  # fmt: skip
 
 

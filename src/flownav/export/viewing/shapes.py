@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from flownav.core.frames import velocity_from_flow
 from flownav.core.measurement import Array
 from flownav.core.record import Record
+from flownav.report.series import mapping
 
 Outline = Array  # (n, 3) points of one line in body FRD [m]
 
@@ -37,7 +38,7 @@ class Camera(NamedTuple):
 
 def vehicle_outline(record: Record) -> list[Outline]:
     """Lines of the vehicle in body FRD: rotor disks, tail boom and skids, or arms and propellers; none if unknown."""
-    said = _mapping(_mapping(record.manifest.get("parameters")).get("vehicle"))
+    said = mapping(mapping(record.manifest.get("parameters")).get("vehicle"))
     values = {str(name): number for name, entry in said.items() if (number := _number(entry)) is not None}
     if "frame.arm_m" in values and "propeller.radius_m" in values:
         return _multirotor(values)
@@ -48,15 +49,15 @@ def vehicle_outline(record: Record) -> list[Outline]:
 
 def cameras(record: Record) -> list[Camera]:
     """The flow camera and the pad camera with the lens and the angle of view that the record's datasheets state."""
-    parameters = _mapping(record.manifest.get("parameters"))
-    sheets = _mapping(parameters.get("sensors"))
+    parameters = mapping(record.manifest.get("parameters"))
+    sheets = mapping(parameters.get("sensors"))
     found = []
-    optics = _mapping(_mapping(parameters.get("flow_sensor")).get("optics"))
+    optics = mapping(mapping(parameters.get("flow_sensor")).get("optics"))
     focal, side = _number(optics.get("focal_length_px")), _number(optics.get("image_side_px"))
     if focal and side and focal > 0.0 and side > 0.0:
         half = 0.5 * side / focal
         found.append(Camera("flow_camera", _lens(sheets.get("flow_camera")), (half, half), side))
-    pad = _mapping(sheets.get("pad_camera"))
+    pad = mapping(sheets.get("pad_camera"))
     forward = _number(pad.get("half_view_deg"))
     if forward is not None and 0.0 < forward < 90.0:
         right = _number(pad.get("half_view_right_deg"))
@@ -112,14 +113,9 @@ def _drawable(lines: list[Outline]) -> list[Outline]:
 
 
 def _lens(sheet: Any) -> tuple[float, float, float]:
-    lens = _mapping(_mapping(sheet).get("lens"))
+    lens = mapping(mapping(sheet).get("lens"))
     forward, right, down = (_number(lens.get(name)) or 0.0 for name in ("forward_m", "right_m", "down_m"))
     return forward, right, down
-
-
-def _mapping(value: Any) -> Mapping[str, Any]:
-    """The value where it is a mapping, an empty one elsewhere: manifests come from files."""
-    return value if isinstance(value, Mapping) else {}
 
 
 def _number(value: Any) -> float | None:

@@ -13,7 +13,7 @@ import math
 from pathlib import Path
 from typing import NamedTuple
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.lab.identification.findings import Findings
 from flownav.lab.identification.quantities import Interval
 from flownav.lab.identification.sensor_file import write_whole
@@ -42,7 +42,7 @@ class Parameter(NamedTuple):
 def parameters(autopilot: str, findings: Findings, sensor: FlowSensor) -> list[Parameter]:
     """The parameters for `px4` or `ardupilot`. InputError for another."""
     if autopilot not in AUTOPILOTS:
-        raise InputError(f"--for {autopilot}: px4 or ardupilot are possible")
+        raise InputError(f"{arg('autopilot')} {autopilot}: px4 or ardupilot are possible")
     return _px4(findings, sensor) if autopilot == "px4" else _ardupilot(findings)
 
 

@@ -16,7 +16,7 @@ from flownav.lab.identification.experiment import Experiment, lay_grid
 from flownav.lab.identification.response import Input, Tried, delayed, response
 
 DELAY_RANGE_S = (-0.1, 0.6)
-CONVERGED = 1e-2  # predicted fall of the cost in residual variances: the step that makes it is the last
+CONVERGED_FALL = 1e-2  # predicted fall of the cost in residual variances: the step that makes it is the last
 MOST_DAMPING = 1e8
 LIGHT_DAMPING = 1e-2  # up to which a step that gains next to nothing is the last
 START_WEIGHT = 1e-4  # of the belief that a run starts at rest, against one reading's of 1
@@ -24,7 +24,7 @@ START_TIME_S = 0.1  # unit of a start's rates
 SMALLEST_EIGENVALUE = 1e-14
 SMALLEST_DIAGONAL = 1e-100  # beside the largest: far below what any data give, far above what overflows
 LEAST_DIAGONAL = 1e-60  # where there is nothing beside it: of data that move by LEAST_MOTION it is more
-STIFFEST = 100.0  # rate x step of a model that is tried: faster ones cannot be told from none
+MOST_STIFFNESS = 100.0  # rate x step of a model that is tried: faster ones cannot be told from none
 LARGEST_PRODUCT = 1e60  # of an unstable model: it has no cost
 
 
@@ -90,7 +90,7 @@ def linearise(run: Experiment, structure: Structure, point: Point, nuisance: Arr
     """Errors and derivatives of one run; `whole` keeps them reading by reading, not their products alone."""
     n = structure.order
     width = structure.parameters + n + 2
-    if n and _stiffness(point) * run.longest_step_s > STIFFEST:
+    if n and _stiffness(point) * run.longest_step_s > MOST_STIFFNESS:
         return Linearised(np.zeros((0, width)), np.full((width, width), np.inf))
     given = Input(run.t_u, run.u, structure.held)
     grid = lay_grid(run.t_u, run.t_y, point.delay_s, run.between)
@@ -210,7 +210,7 @@ def descend(runs: Sequence[Experiment], structure: Structure, state: State, iter
             break
         normal = normal_equations(state.parts, structure.parameters)
         full = _solve(normal.matrix, normal.gradient, 0.0)
-        converged = _predicted_fall(normal, full) <= CONVERGED * state.cost / readings
+        converged = _predicted_fall(normal, full) <= CONVERGED_FALL * state.cost / readings
         while damping < MOST_DAMPING:
             step = _solve(normal.matrix, normal.gradient, damping)
             point = state.point.moved(step, structure)
@@ -223,7 +223,7 @@ def descend(runs: Sequence[Experiment], structure: Structure, state: State, iter
             damping *= 10.0
         else:
             break
-        small = state.cost - cost_of(parts) <= CONVERGED * state.cost / readings and damping <= LIGHT_DAMPING
+        small = state.cost - cost_of(parts) <= CONVERGED_FALL * state.cost / readings and damping <= LIGHT_DAMPING
         state = State(point, moved, parts, cost_of(parts), converged or small)
         damping = max(0.1 * damping, 1e-12)
     return state
@@ -237,7 +237,7 @@ def inverse_of(matrix: Array) -> Array:
 
 # -- where the fits start ----------------------------------------------------------------------------------------
 DELAY_STEPS = 71
-READINGS = 1000  # of a run, that the delays are compared on
+COMPARED_READINGS = 1000  # of a run, that the delays are compared on
 SHORTEST_LAG_S = 2e-3
 FAST_POLE = 4.0
 
@@ -259,7 +259,7 @@ def points(guess: tuple[float, float], structure: Structure) -> list[Point]:
 def gain_and_delay(runs: Sequence[Experiment], delay_range_s: tuple[float, float]) -> tuple[float, float]:
     """The gain and the delay on a grid that explain most, by regression of each run on its shifted input."""
     best = (0.0, 1.0, 0.0)
-    thin = [(run, slice(None, None, max(1, len(run.t_y) // READINGS))) for run in runs]
+    thin = [(run, slice(None, None, max(1, len(run.t_y) // COMPARED_READINGS))) for run in runs]
     for delay_s in np.linspace(*delay_range_s, DELAY_STEPS):
         across, along = 0.0, 1e-300
         for run, some in thin:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -105,17 +105,17 @@ class Experiment:
                 f"{LEAST_READINGS} are needed, beyond the first {delay_range_s[1]:g} s"
             )
         _require_motion(self.name, "sensor", self.y[inside])
-        return Experiment(self.name, self.t_u, self.u, self.t_y[inside], self.y[inside], self.between, self.height_m)
+        return replace(self, t_y=self.t_y[inside], y=self.y[inside])
 
     def between_times(self, start_s: float, end_s: float) -> Experiment:
         """The readings from start to end with the input of all times; not checked for length."""
         inside = (self.t_y >= start_s) & (self.t_y < end_s)
-        return Experiment(self.name, self.t_u, self.u, self.t_y[inside], self.y[inside], self.between, self.height_m)
+        return replace(self, t_y=self.t_y[inside], y=self.y[inside])
 
     def from_input(self, first: int) -> Experiment:
         """The run with its input from a sample on; not checked for length."""
         t_u = self.t_u[first:]
-        return Experiment(self.name, t_u, self.u[first:], self.t_y, self.y, distinct_steps(np.diff(t_u)), self.height_m)
+        return replace(self, t_u=t_u, u=self.u[first:], between=distinct_steps(np.diff(t_u)))
 
     @property
     def longest_step_s(self) -> float:

@@ -1,9 +1,11 @@
 """What an identification found, whatever kind of log it came from: the one bundle that file, JSON and table read."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from flownav.core.measurement import Array
 from flownav.core.text import finite
 from flownav.lab.identification import height_law
 from flownav.lab.identification.first_look import Axes
@@ -56,6 +58,17 @@ class Noise:
     schedules: tuple[height_law.ScheduleScore, ...]
     signal_sigma_m_s: float
     tail: float
+
+
+def noise_of(
+    error: Array, height_m: Array, quality: Array, signal_sigma_m_s: float, points: Sequence[height_law.NoisePoint] = ()
+) -> Noise:
+    """The noise that errors show; all (n,), in order of time. points: by height, in place of bins of equal shares."""
+    points = points or height_law.noise_by_height(error, height_m)
+    law = height_law.fit_power_law(points)
+    grades = tuple(height_law.variance_by_quality(error, quality))
+    schedules = tuple(height_law.compare_schedules(error, height_m, quality, signal_sigma_m_s))
+    return Noise(tuple(points), law, grades, schedules, signal_sigma_m_s, height_law.tail(error, law.at(height_m)))
 
 
 @dataclass(frozen=True)
@@ -111,18 +124,14 @@ def facts_of(findings: Findings) -> dict[str, Any]:
         "kind": findings.kind,
         "reference": findings.reference,
         "axes": findings.axes.verdict,
-        "gain": findings.gain.as_dict(),
-        "latency_s": findings.latency_s.as_dict(),
+        "gain": findings.gain._asdict(),
+        "latency_s": findings.latency_s._asdict(),
         "order": findings.best.model.structure.label,
         "fit_percent": findings.best.model.fit_percent,
-        "excitation": {
-            "parameters": findings.excitation.parameters,
-            "identifiable": findings.excitation.identifiable,
-            "verdict": findings.excitation.verdict,
-        },
+        "excitation": {name: getattr(findings.excitation, name) for name in ("parameters", "identifiable", "verdict")},
         "noise": {
             "law": {
-                "sigma_m_s": law.sigma_m_s.as_dict(), "exponent": law.exponent.as_dict(),
+                "sigma_m_s": law.sigma_m_s._asdict(), "exponent": law.exponent._asdict(),
                 "reference_height_m": law.reference_m, "low_m": law.low_m, "high_m": law.high_m,
             },
             "by_height": [p._asdict() | {"sigma_rad_s": p.sigma_rad_s} for p in findings.noise.points],
@@ -141,7 +150,7 @@ def _speed(findings: Findings) -> dict[str, Any] | None:
     law = findings.scale_with_speed
     if law is None:
         return None
-    ends = {"per_m_s": law.per_m_s.as_dict(), "at_slow": law.at_slow.as_dict(), "at_fast": law.at_fast.as_dict()}
+    ends = {"per_m_s": law.per_m_s._asdict(), "at_slow": law.at_slow._asdict(), "at_fast": law.at_fast._asdict()}
     return {**ends, "slow_m_s": law.slow_m_s, "fast_m_s": law.fast_m_s, "matters": law.matters, "verdict": law.verdict}
 
 
@@ -150,8 +159,8 @@ def _response(response: Response) -> dict[str, Any]:
     return {
         "axis": response.axis,
         "height_m": response.height_m,
-        "gain": response.gain.as_dict(),
-        "latency_s": response.latency_s.as_dict(),
+        "gain": response.gain._asdict(),
+        "latency_s": response.latency_s._asdict(),
         "order": model.structure.label,
         "fit_percent": model.fit_percent,
         "fits_percent": list(model.fits),

@@ -10,10 +10,9 @@ import numpy as np
 from flownav.core.measurement import Array, Sensor
 from flownav.lab.identification import reference_motion
 from flownav.lab.identification.flight import IMU_NAME, Flight, flight
-from flownav.logs.frames import mean_over
-from flownav.logs.log import Log
+from flownav.logs.log import Log, mean_over
 
-CLEAR = 2.0  # the best assignment must explain this much more than the next
+CLEAR_RATIO = 2.0  # the best assignment must explain this much more than the next
 
 # how a sensor's axes may lie, as sensor = axes @ vehicle
 ALL_AXES = tuple(
@@ -53,7 +52,7 @@ def judge(response: Array, yaw_known: bool = True) -> Axes:
     scores = [float(np.sum(candidate * unit)) for candidate in ALL_AXES]
     order = np.argsort(scores)[::-1]
     best = ALL_AXES[order[0]]
-    clear = scores[order[0]] > CLEAR * max(scores[order[1]], 0.0) or scores[order[0]] - scores[order[1]] > 0.5
+    clear = scores[order[0]] > CLEAR_RATIO * max(scores[order[1]], 0.0) or scores[order[0]] - scores[order[1]] > 0.5
     rest = best.T @ unit
     turned = float(np.degrees(np.arctan2(rest[1, 0] - rest[0, 1], rest[0, 0] + rest[1, 1])))
     return Axes(best, sentence(best) if clear else f"unclear; nearest: {sentence(best)}", clear, turned)
@@ -177,7 +176,7 @@ def _against_imu(log: Log) -> Look:
         scores.append((tie.likeness * float(np.cos(tie.turn_rad)), tie.alike, tie.delay_s.value))
     order = np.argsort([score for score, _, _ in scores])[::-1]
     best, (score, alike, lag_s) = ALL_AXES[order[0]], scores[order[0]]
-    clear = alike and (order[0] == 0 or score > CLEAR * max(scores[0][0], 0.0))  # than with the axes as they should be
+    clear = alike and (order[0] == 0 or score > CLEAR_RATIO * max(scores[0][0], 0.0))  # than axes as they should be
     fast = reference_motion.fast_flow(flown, moved.t_s, flown.velocity_m_s @ best)
     inertial = reference_motion.on_grid(moved.t_s, moved.velocity_m_s[:, :2], flown.t_s[flown.good] - lag_s)
     scale = float(np.sum(fast * inertial) / max(float(np.sum(inertial**2)), 1e-12))

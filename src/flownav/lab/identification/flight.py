@@ -17,12 +17,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.frames import GRAVITY_M_S2 as GRAVITY_M_S2
 from flownav.core.frames import rotation_from_quaternion, velocity_from_flow
 from flownav.core.measurement import Array, Sensor, Stream
-from flownav.logs.frames import attitude_at
-from flownav.logs.log import Log
+from flownav.logs.log import Log, attitude_at
 from flownav.replays.bundle import turned_sensor, with_attitude
 from flownav.replays.judged import flying_at
 from flownav.replays.prepare import ReplayOptions, prepare
@@ -214,7 +213,9 @@ def _velocity_and_rate(sensor: Sensor, value: Array, range_m: Array) -> tuple[Ar
 
 def _reference(log: Log, wanted: str) -> tuple[str, Array, Array]:
     if wanted not in ("auto", "imu", *REFERENCES):
-        raise InputError(f"--reference {wanted}: auto, truth (truth.csv) or gps (gps.csv) are possible for a flight")
+        raise InputError(
+            f"{arg('reference')} {wanted}: auto, truth (truth.csv) or gps (gps.csv) are possible for a flight"
+        )
     if wanted == "imu" and Sensor.IMU in log.streams:
         t_s = log.streams[Sensor.IMU].t_s
         return "imu", t_s, np.zeros((len(t_s), 3))

@@ -16,10 +16,9 @@ import numpy as np
 
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array
-from flownav.lab.identification import height_law
 from flownav.lab.identification.descent import Structure
 from flownav.lab.identification.experiment import Experiment, experiment
-from flownav.lab.identification.findings import Findings, Noise, Response
+from flownav.lab.identification.findings import Findings, Noise, Response, noise_of
 from flownav.lab.identification.first_look import Axes, judged
 from flownav.lab.identification.flight import Flight
 from flownav.lab.identification.output_error import Z_95, fit
@@ -39,7 +38,7 @@ CLUSTER_S = 3.0
 FLIGHT_ORDERS = (Structure(0), Structure(1), Structure(2))
 WORST_BIAS = 0.02
 LEAST_LIKENESS = 0.4  # of flow and reference: less is the luck of a short flight
-CLEAR = 0.8  # likeness to the IMU from which it, and not the reference, shows the dynamics
+CLEAR_LIKENESS = 0.8  # likeness to the IMU from which it, and not the reference, shows the dynamics
 
 
 class Scale(NamedTuple):
@@ -204,7 +203,7 @@ def _dynamic_runs(
     flown: Flight, moved: Motion, velocity: Array, runs: Sequence[Experiment]
 ) -> Sequence[Sequence[Experiment]]:
     """What shows the dynamics of x and of y: above 1/SPLIT_S the IMU where it serves, else the reference."""
-    if moved.fast_m_s is None or moved.flow_tie is None or moved.flow_tie.likeness < CLEAR:
+    if moved.fast_m_s is None or moved.flow_tie is None or moved.flow_tie.likeness < CLEAR_LIKENESS:
         return [[run] for run in runs]
     other = fast_flow(flown, moved.t_s, velocity)
     both = fast_experiments(flown.name, moved.t_s, moved.fast_m_s, flown.t_s[flown.good], other)
@@ -216,17 +215,7 @@ def _noise(flown: Flight, velocity: Array, residuals: Sequence[Array]) -> Noise:
     ranges, quality = flown.range_m[flown.good], flown.quality[flown.good]
     error = np.concatenate([_complete(residual, len(ranges)) for residual in residuals])
     height, grade = np.concatenate([ranges, ranges]), np.concatenate([quality, quality])
-    points = height_law.noise_by_height(error, height)
-    signal = float(velocity[flown.good].std())
-    law = height_law.fit_power_law(points)
-    return Noise(
-        tuple(points),
-        law,
-        tuple(height_law.variance_by_quality(error, grade)),
-        tuple(height_law.compare_schedules(error, height, grade, signal)),
-        signal,
-        height_law.tail(error, law.at(height)),
-    )
+    return noise_of(error, height, grade, float(velocity[flown.good].std()))
 
 
 def _complete(residual: Array, count: int) -> Array:
@@ -288,6 +277,6 @@ def _details(
     for name, tie in (("flow", moved.flow_tie), ("reference", moved.reference_tie)):
         if tie is not None:
             details[f"{name}_against_imu"] = {
-                "delay_s": tie.delay_s.as_dict(), "turn_deg": float(np.degrees(tie.turn_rad)), "likeness": tie.likeness
+                "delay_s": tie.delay_s._asdict(), "turn_deg": float(np.degrees(tie.turn_rad)), "likeness": tie.likeness
             }  # fmt: skip
     return details

@@ -23,9 +23,9 @@ from flownav.lab.identification.output_error import Z_95
 from flownav.lab.identification.quantities import Interval
 
 ACCURACY, ACCURACY_HEIGHT_M = 0.90, 0.6
-BINS = 8
+MOST_BINS = 8
 LEAST_IN_BIN = 40
-BLOCK = 200  # readings
+BLOCK_READINGS = 200  # readings
 SMALLEST_SIGMA_M_S = 1e-4
 QUALITY_EDGES = (1.0, 64.0, 128.0, 192.0, 255.0, 256.0)
 
@@ -115,7 +115,7 @@ def noise_by_height(error: Array, height_m: Array) -> list[NoisePoint]:
 
     About the mean of each bin, outliers beyond five median deviations left out.
     """
-    count = max(1, min(BINS, len(error) // LEAST_IN_BIN))
+    count = max(1, min(MOST_BINS, len(error) // LEAST_IN_BIN))
     edges = np.unique(np.quantile(height_m, np.linspace(0.0, 1.0, count + 1)))
     if len(edges) < 2:
         return [NoisePoint(float(height_m[0]), spread(error), len(error))]
@@ -152,7 +152,7 @@ def tail(error: Array, sigma: Array) -> float:
 
 def compare_schedules(error: Array, height_m: Array, quality: Array, signal_sigma_m_s: float) -> list[ScheduleScore]:
     """The table, best first; error, height and quality (n,) in order of time."""
-    trained = (np.arange(len(error)) // max(1, min(BLOCK, len(error) // 4))) % 2 == 0
+    trained = (np.arange(len(error)) // max(1, min(BLOCK_READINGS, len(error) // 4))) % 2 == 0
     fitted: dict[str, Callable[[NDArray[np.bool_]], Array]] = {
         "constant": _constant(error[trained]),
         "quality": _by_quality(error[trained], quality[trained], quality),

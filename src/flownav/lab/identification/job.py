@@ -5,21 +5,21 @@ from pathlib import Path
 
 import numpy as np
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.guard import inputs_there
 from flownav.core.measurement import Array
-from flownav.lab.identification import height_law
 from flownav.lab.identification.descent import DELAY_RANGE_S, Structure
-from flownav.lab.identification.findings import Findings, Noise, Response, RunModel
+from flownav.lab.identification.findings import Findings, Noise, Response, RunModel, noise_of
 from flownav.lab.identification.first_look import one_axis
 from flownav.lab.identification.flight_identification import identify_flight
+from flownav.lab.identification.height_law import NoisePoint, spread
 from flownav.lab.identification.output_error import fit
 from flownav.lab.identification.quantities import CANDIDATES, choose, cross_validation, gain, latency
 from flownav.lab.identification.rig_log import Run, assign_heights, is_rig, read_runs
 from flownav.logs.open_log import log_kind
 
 SAME_HEIGHT = 0.02  # runs within 2 % of a height belong together
-UNKNOWN_HEIGHT = "its height is unknown: give --heights, height_m in rig.toml, or a ground_distance_m column"
+UNKNOWN_HEIGHT = f"its height is unknown: give {arg('heights_m')}, height_m in rig.toml, or a ground_distance_m column"
 
 
 def identify_rig(runs: Sequence[Run], candidates: Sequence[Structure], validate: bool = True) -> Findings:
@@ -77,36 +77,16 @@ def _run_models(height_m: float, members: Sequence[Run]) -> list[RunModel]:
 
 def _noise(errors: Sequence[tuple[Run, Array]]) -> Noise:
     """Errors are the residuals of the joint models; their readings are those inside the delays considered."""
-    height, quality, error, signal, name = [], [], [], [], []
+    parts = []
     for run, residual in errors:
         t_y, t_u = run.experiment.t_y, run.experiment.t_u
         used = (t_y - DELAY_RANGE_S[1] >= t_u[0]) & (t_y - DELAY_RANGE_S[0] <= t_u[-1])
-        height.append(np.full(len(residual), run.experiment.height_m))
-        quality.append(run.quality[used])
-        error.append(residual)
-        signal.append(run.experiment.y[used])
-        name.append(run.experiment.height_m)
-    by_height = [
-        _point(height_m, np.concatenate([e for e, h in zip(error, name, strict=True) if h == height_m]))
-        for height_m in sorted(set(name))
-    ]
-    errors_all, heights_all = np.concatenate(error), np.concatenate(height)
-    quality_all, signal_sigma = np.concatenate(quality), float(np.concatenate(signal).std())
-    points = by_height if len(by_height) > 1 else height_law.noise_by_height(errors_all, heights_all)
-    law = height_law.fit_power_law(points)
-    return Noise(
-        tuple(points),
-        law,
-        tuple(height_law.variance_by_quality(errors_all, quality_all)),
-        tuple(height_law.compare_schedules(errors_all, heights_all, quality_all, signal_sigma)),
-        signal_sigma,
-        height_law.tail(errors_all, law.at(heights_all)),
-    )
-
-
-def _point(height_m: float, error: Array) -> height_law.NoisePoint:
-    """A noise point from all errors at one height."""
-    return height_law.NoisePoint(height_m, height_law.spread(error), len(error))
+        height_m = np.full(len(residual), run.experiment.height_m)
+        parts.append((residual, height_m, run.quality[used], run.experiment.y[used]))
+    error, height, quality, signal = (np.concatenate(column) for column in zip(*parts, strict=True))
+    one_each = [(float(height_m), error[height == height_m]) for height_m in np.unique(height)]
+    points = [NoisePoint(height_m, spread(own), len(own)) for height_m, own in one_each] if len(one_each) > 1 else []
+    return noise_of(error, height, quality, float(signal.std()), points)
 
 
 # -- rig logs or a flight ----------------------------------------------------------------------------------------
@@ -133,10 +113,12 @@ def identify(
         raise InputError(f"{flights[0]}: a flight is identified alone; give rig logs together, flights one by one")
     if flights:
         if heights_m:
-            raise InputError("--heights: a flight's heights come from its range readings; leave the option out")
+            raise InputError(
+                f"{arg('heights_m')}: a flight's heights come from its range readings; leave the option out"
+            )
         return identify_flight(flights[0], structures, reference, flow_instance)
     if flow_instance is not None:
-        raise InputError("--flow-instance: a rig log holds one flow sensor; leave the option out")
+        raise InputError(f"{arg('flow_instance')}: a rig log holds one flow sensor; leave the option out")
     for path in logs:
         if not is_rig(path):
             raise InputError(

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 from flownav.lab.identification.descent import DELAY_RANGE_S, Point, Structure, gain_and_delay
 from flownav.lab.identification.experiment import LEAST_READINGS, Experiment
@@ -47,10 +47,6 @@ class Interval(NamedTuple):
         """The interval of a positive value whose logarithm is the normal one, with standard deviation sigma."""
         spread = float(np.exp(min(Z_95 * sigma, 50.0)))
         return cls(value, value / spread, value * spread)
-
-    def as_dict(self) -> dict[str, float]:
-        """For JSON and files."""
-        return {"value": self.value, "low": self.low, "high": self.high}
 
 
 class Excitation(NamedTuple):
@@ -210,7 +206,7 @@ def parse_order(text: str) -> tuple[Structure, ...]:
         return (Structure(0),)
     order, plus, delay = text.partition("+")
     if not order.isdigit() or not 1 <= int(order) <= 6 or (plus and delay != "delay"):
-        raise InputError(f"--order {text}: auto, delay, 1 to 6, or an order with +delay (2+delay) is needed")
+        raise InputError(f"{arg('order')} {text}: auto, delay, 1 to 6, or an order with +delay (2+delay) is needed")
     return (Structure(int(order), bool(plus)),)
 
 

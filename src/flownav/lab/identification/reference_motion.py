@@ -18,13 +18,13 @@ from flownav.lab.identification.experiment import Experiment, experiment
 from flownav.lab.identification.flight import GRAVITY_M_S2, Flight
 from flownav.lab.identification.output_error import Z_95, fit
 from flownav.lab.identification.quantities import Interval, latency
-from flownav.logs.frames import mean_over
+from flownav.logs.log import mean_over
 
 GRID_S = 0.02
 SPLIT_S = 1.0
-EDGE = 5.0  # of those are left out at either end
+EDGE_SPLITS = 5.0  # of those are left out at either end
 HALF_SPAN_S = 0.1  # of the differences that make a reference's velocity
-SIGNIFICANT = 4.0  # standard errors of a correlation of nothing
+SIGNIFICANT_SIGMAS = 4.0  # standard errors of a correlation of nothing
 IMU_ERROR_RAD = 0.25  # of its word on the reference's heading
 LEAST_ALIKE = 0.5  # correlation of flow and reference from which the flow says the reference's heading
 ALIKE_S, ALIKE_LAGS_S = 0.5, (-0.2, 0.6, 0.02)
@@ -45,7 +45,7 @@ class Tie(NamedTuple):
     @property
     def alike(self) -> bool:
         """Whether the two saw the same motion, beyond chance: their angle is known."""
-        return bool(self.likeness >= SIGNIFICANT / np.sqrt(self.independent))
+        return bool(self.likeness >= SIGNIFICANT_SIGMAS / np.sqrt(self.independent))
 
     @property
     def holds(self) -> bool:
@@ -219,7 +219,7 @@ def _tie(grid: Array, fast: Array, t_s: Array, other: Array) -> Tie:
 
     Not near the ends, where the Gaussian mean is of what the log no longer holds.
     """
-    edge = min(EDGE * SPLIT_S, 0.1 * (grid[-1] - grid[0]))
+    edge = min(EDGE_SPLITS * SPLIT_S, 0.1 * (grid[-1] - grid[0]))
     inner = (t_s >= grid[0] + edge) & (t_s <= grid[-1] - edge)
     t_s, other = t_s[inner], other[inner]
     signal = other[:, 0] + 1j * other[:, 1]

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from pydantic import ConfigDict
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.files import natural_order
 from flownav.core.guard import an_input
 from flownav.core.measurement import Array
@@ -74,7 +74,7 @@ def read_runs(path: Path, height_m: float | None = None, reference: str = "auto"
     if not an_input(path).exists():
         raise InputError(f"{path}: no such file or folder; identify takes rig logs, rig CSV files and flight folders")
     if reference not in ("auto", *REFERENCES):
-        raise InputError(f"--reference {reference}: auto, velocity or encoder are possible for a rig log")
+        raise InputError(f"{arg('reference')} {reference}: auto, velocity or encoder are possible for a rig log")
     if path.is_file():
         return [_read(path, path.with_name("rig.toml"), height_m, reference)]
     folders = [path] if (path / "rig.csv").exists() else _run_folders(path)
@@ -168,9 +168,11 @@ def assign_heights(logs: Sequence[Path], heights_m: Sequence[float]) -> list[flo
     if not heights_m:
         return [None] * len(logs)
     if any(not 0.01 <= height <= 1000.0 for height in heights_m):
-        raise InputError("--heights: metres from 0.01 to 1000 are needed")
+        raise InputError(f"{arg('heights_m')}: metres from 0.01 to 1000 are needed")
     if len(heights_m) == 1:
         return [heights_m[0]] * len(logs)
     if len(heights_m) != len(logs):
-        raise InputError(f"--heights: {len(heights_m)} heights for {len(logs)} logs; give one for all or one each")
+        raise InputError(
+            f"{arg('heights_m')}: {len(heights_m)} heights for {len(logs)} logs; give one for all or one each"
+        )
     return list(heights_m)

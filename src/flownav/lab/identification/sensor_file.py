@@ -23,12 +23,12 @@ from flownav.lab.identification.quantities import Interval, coefficients, numera
 from flownav.sensors.datasheet import FlowSensor
 
 SHORTEST_LATENCY_S = 0.005
-STEEPEST = 4.0
-DIGITS = 7  # of the numbers in the file
+STEEPEST_EXPONENT = 4.0
+FILE_DIGITS = 7  # of the numbers in the file
 
 
 def sensor_entries(findings: Findings, base: FlowSensor, name: str, provenance: str) -> dict[str, Any]:
-    """The file's content as nested dictionaries, in the order in which it is written, numbers of DIGITS digits."""
+    """The file's content as nested dictionaries, in the order in which it is written, numbers of FILE_DIGITS digits."""
     entries = {
         "schema_version": 1,
         "name": name,
@@ -37,10 +37,7 @@ def sensor_entries(findings: Findings, base: FlowSensor, name: str, provenance: 
         "dynamics": _dynamics(findings),
         "noise": _noise(findings),
         "limits": _limits(findings, base),
-        "optics": {
-            "focal_length_px": _taken(base.optics.focal_length_px, base),
-            "image_side_px": _taken(base.optics.image_side_px, base),
-        },
+        "optics": {key: _taken(getattr(base.optics, key), base) for key in ("focal_length_px", "image_side_px")},
         "identification": _identification(findings),
         "identified_models": _run_models(findings),
     }
@@ -54,7 +51,7 @@ def _rounded(value: Any) -> Any:
         return {key: _rounded(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [_rounded(item) for item in value]
-    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
+    return float(f"{value:.{FILE_DIGITS}g}") if isinstance(value, float) else value
 
 
 def write_sensor(path: Path, entries: Mapping[str, Any]) -> FlowSensor:
@@ -71,7 +68,7 @@ def write_whole(path: Path, text: str) -> None:
         with written_whole(path) as temporary:
             temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
+        raise InputError(f"{path}: cannot be written ({error.strerror}); give another name") from error
 
 
 # -- the tables ----------------------------------------------------------------------------------------------
@@ -99,11 +96,8 @@ def _dynamics(findings: Findings) -> dict[str, Any]:
     gain = best.gain if findings.kind == "rig" else findings.gain
     slowness, stiffness = bessel(max(findings.latency_s.value, SHORTEST_LATENCY_S))
     source = "Bessel lag of the identified gain and latency; the natural frequency is assumed"
-    return {
-        "a_1_s2": {"value": abs(gain.value) * stiffness, "source": source},
-        "b_1_s": {"value": slowness, "source": source},
-        "c_1_s2": {"value": stiffness, "source": source},
-    }
+    lag = {"a_1_s2": abs(gain.value) * stiffness, "b_1_s": slowness, "c_1_s2": stiffness}
+    return {key: {"value": value, "source": source} for key, value in lag.items()}
 
 
 def bessel(latency_s: float) -> tuple[float, float]:
@@ -113,7 +107,7 @@ def bessel(latency_s: float) -> tuple[float, float]:
 
 def _noise(findings: Findings) -> dict[str, Any]:
     law = findings.noise.law
-    exponent = float(np.clip(law.exponent.value, -STEEPEST, STEEPEST))
+    exponent = float(np.clip(law.exponent.value, -STEEPEST_EXPONENT, STEEPEST_EXPONENT))
     source = f"{len(findings.noise.points)} heights, weighted least squares of log sigma on log h, +- 95 %"
     entries: dict[str, Any] = {"law": "power" if law.high_m > law.low_m and exponent != 0.0 else "constant"}
     entries["sigma_m_s"] = _valued(law.sigma_m_s, source)
@@ -163,9 +157,7 @@ def _identification(findings: Findings) -> dict[str, Any]:
         "notes": list(findings.notes),
         "dynamics": _dynamics_interval(findings.best),
         "responses": [_response(response) for response in findings.responses],
-        "noise": [
-            {"height_m": p.height_m, "sigma_m_s": p.sigma_m_s, "readings": p.readings} for p in findings.noise.points
-        ],
+        "noise": [point._asdict() for point in findings.noise.points],
         "quality": [
             {"quality_low": q.low, "quality_high": q.high, "variance_m2_s2": q.variance_m2_s2, "readings": q.readings}
             for q in findings.noise.quality

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.files import natural_order
 from flownav.core.guard import an_input, written_whole
 
@@ -116,7 +116,9 @@ def binned(frames: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
     n, height, width = frames.shape
     rows, columns = height // factor, width // factor
     if min(rows, columns) < 1:
-        raise InputError(f"frames of {width}x{height} pixels cannot be binned by {factor}; give a smaller --bin")
+        raise InputError(
+            f"frames of {width}x{height} pixels cannot be binned by {factor}; give a smaller {arg('factor')}"
+        )
     blocks = frames[:, : rows * factor, : columns * factor].reshape(n, rows, factor, columns, factor)
     return np.asarray(np.round(blocks.mean(axis=(2, 4))), np.uint8)
 

@@ -10,7 +10,7 @@ from flownav.lab.optics.pad import PadTarget
 from flownav.lab.optics.pad_statistics import PadLaws
 from flownav.lab.optics.pad_trial import TrialCamera
 
-SMALLEST = 1e-5  # a figure below this is none
+SMALLEST_FIGURE = 1e-5  # a figure below this is none
 
 
 class Assumed(NamedTuple):
@@ -52,7 +52,7 @@ def datasheet(
 
 
 def _entry(name: str, value: float, source: str) -> str:
-    return f'{name} = {{ value = {value if abs(value) > SMALLEST else 0.0:.4g}, source = "{source}" }}'
+    return f'{name} = {{ value = {value if abs(value) > SMALLEST_FIGURE else 0.0:.4g}, source = "{source}" }}'
 
 
 def _camera_lines(laws: PadLaws, trial: TrialCamera, target: PadTarget, assumed: Assumed) -> list[str]:

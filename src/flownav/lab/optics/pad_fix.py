@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from flownav.core.measurement import Array
 from flownav.lab.optics import squares
 from flownav.lab.optics.pad import BOARD_CELLS, TAG_CELLS, PadTarget, checked, corners_m, picture_cells
-from flownav.lab.optics.plane_pose import PlanePose, homography, mapped, plane_pose
-from flownav.lab.optics.projection import Pose, image_point
+from flownav.lab.optics.projection import PlanePose, Pose, homography, image_point, mapped, plane_pose
 
 # why there is no fix, from the least to the most that was seen
 NO_FRAME = "not a frame of grey levels"

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import binom, norm
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 from flownav.lab.optics.pad_trial import TrialFrame
 
@@ -28,9 +28,9 @@ LEAST_SHARE = 0.5  # of the frames with the whole pad in view: heights that give
 LEAST_FRAMES = 5
 EASY_RATE_RAD_S, EASY_PART = 1.75, 0.75
 SHARE_FLOOR = 1e-3  # of missed frames: fewer than that nobody measures with some thousand frames
-UNLIKELY = 0.01
+UNLIKELY_PROBABILITY = 0.01
 REACH_STEP = 1.2
-PASSES = 3
+FIT_PASSES = 3
 
 
 class Cell(NamedTuple):
@@ -115,14 +115,17 @@ def biases_and_laws(c: dict[str, Array]) -> tuple[dict[int, FlightBias], NoiseLa
     angle = distance = NoiseLaw(1.0, 0.0, 0.0, 0.0)
     left = np.full_like(c["error"], np.nan)
     biases: dict[int, FlightBias] = {}
-    for _ in range(PASSES):
+    for _ in range(FIT_PASSES):
         for flight in np.unique(c["flight"][used]):
             own = used & (c["flight"] == flight)
             if own.sum() >= LEAST_FRAMES:
                 biases[int(flight)], left[own] = _bias(c, own, angle, distance)
         kept = np.isfinite(left).all(1)
         if kept.sum() < LEAST_FRAMES:
-            raise InputError("pad: too few frames with a fix for a datasheet; give more --frames, or other --heights")
+            raise InputError(
+                "pad: too few frames with a fix for a datasheet; "
+                f"give more {arg('frames')}, or other {arg('heights_m')}"
+            )
         h, w, flights = c["reach_m"][kept], c["image_rate_rad_s"][kept], c["flight"][kept]
         angle = fitted_noise(left[kept, :2], h, w, flights)
         distance = fitted_noise(left[kept, 2:3], h, w, flights)
@@ -186,7 +189,7 @@ def missed_law(c: dict[str, Array], max_height_m: float) -> MissedLaw:
     missed = 1.0 - c["found"]
     flights = [f for f in np.unique(c["flight"][used]) if (easy & (c["flight"] == f)).sum() >= LEAST_FRAMES]
     if not flights:
-        raise InputError("pad: too few slow frames from below; give more --frames")
+        raise InputError(f"pad: too few slow frames from below; give more {arg('frames')}")
     counts = np.array([(easy & (c["flight"] == f)).sum() for f in flights])
     shares = hidden_shares(np.array([missed[easy & (c["flight"] == f)].sum() for f in flights]), counts)
     by_flight = dict(zip(flights, shares, strict=True))
@@ -216,7 +219,7 @@ def hidden_shares(missed: Array, counts: Array) -> Array:
     None where the median flight might miss as many by chance once in a hundred flights.
     """
     usual = float(np.median(missed / counts))
-    unlikely = binom.sf(missed - 1, counts, max(usual, 0.5 / counts.sum())) < UNLIKELY
+    unlikely = binom.sf(missed - 1, counts, max(usual, 0.5 / counts.sum())) < UNLIKELY_PROBABILITY
     return np.where(unlikely, (missed / counts - usual) / (1.0 - usual), 0.0)
 
 

@@ -45,7 +45,7 @@ from flownav.sensors.geometry import image_rate_rad_s
 
 TILT_RAD = float(np.radians(15.0))
 RATE_RAD_S = 0.15  # standard deviation of each of the body's rates
-MIDDLE = 0.25  # the pad's centre lies within so much of the frame's width and height from its middle
+MIDDLE_SHARE = 0.25  # the pad's centre lies within so much of the frame's width and height from its middle
 DIMMEST, BRIGHTEST, SUNNY = 0.1, 8.0, 1.0  # light, relative to that of the normal exposure
 MEAN_GREY = 70.0  # of a frame, as the automatic exposure wants it
 EXPOSURE_SPREAD = 0.25  # of the automatic exposure's grey level, as a logarithm
@@ -182,7 +182,7 @@ def drawn_pose(optic: Optic, height_m: float, tilt_rad: float, rng: np.random.Ge
     tilt, way, yaw = tilt_rad * np.sqrt(rng.uniform()), *rng.uniform(-np.pi, np.pi, 2)
     turned = {"roll_rad": tilt * np.cos(way), "pitch_rad": tilt * np.sin(way), "yaw_rad": yaw}
     size = np.array([optic.camera.width_px, optic.camera.height_px])
-    ray = rays_of(optic.lens, rng.uniform(-MIDDLE, MIDDLE, 2) * size)
+    ray = rays_of(optic.lens, rng.uniform(-MIDDLE_SHARE, MIDDLE_SHARE, 2) * size)
     x_m, y_m, _ = ground_point(pose_looking_down(0.0, 0.0, height_m, **turned), float(ray[0]), float(ray[1]), 1.0)
     return pose_looking_down(-x_m, -y_m, height_m, **turned)
 

@@ -6,14 +6,14 @@ its rays. Motion blur is the mean over two instants of the exposure (the Gauss p
 the whole. Stripes seen square on need no raster: `stripe_row` sums their harmonics.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.compile import cos, equation, kernel, sin
+from flownav.core.compile import cos, equation, kernel, sin, write_function
 from flownav.core.errors import InputError
 from flownav.lab.optics.camera import (
     Camera,
@@ -165,6 +165,15 @@ class Chip(NamedTuple):
     bank: NDArray[np.float32]
 
 
+def interpolating(kind: type[Pose]) -> Callable[[Pose, Pose, float], Pose]:
+    """An equation: the pose this part of the way from a to b, of two so near that rotations may be interpolated."""
+    told = ", ".join(f"a.{name} + part * (b.{name} - a.{name})" for name in kind._fields)
+    return equation(write_function("between", f"def between(a, b, part):\n    return Pose({told})\n", {"Pose": kind}))
+
+
+between = interpolating(Pose)
+
+
 @kernel
 def take_raster_frame(raster, opened, closed, focal_px, chip, frame, image, grey):  # type: ignore[no-untyped-def]
     """One frame of a raster pad, exposed while the camera moved from pose `opened` to pose `closed`."""
@@ -173,25 +182,6 @@ def take_raster_frame(raster, opened, closed, focal_px, chip, frame, image, grey
         pose = between(opened, closed, part)
         add_view(raster.reflectance, raster.texel_m, pose, focal_px, np.float32(0.5), image)
     digitise(image, chip.exposure, chip.bank, frame, grey)
-
-
-@equation
-def between(a: Pose, b: Pose, part: float) -> Pose:
-    """The pose this part of the way from a to b (of two poses so near that rotations may be interpolated)."""
-    return Pose(
-        a.x_m + part * (b.x_m - a.x_m),
-        a.y_m + part * (b.y_m - a.y_m),
-        a.height_m + part * (b.height_m - a.height_m),
-        a.r11 + part * (b.r11 - a.r11),
-        a.r12 + part * (b.r12 - a.r12),
-        a.r13 + part * (b.r13 - a.r13),
-        a.r21 + part * (b.r21 - a.r21),
-        a.r22 + part * (b.r22 - a.r22),
-        a.r23 + part * (b.r23 - a.r23),
-        a.r31 + part * (b.r31 - a.r31),
-        a.r32 + part * (b.r32 - a.r32),
-        a.r33 + part * (b.r33 - a.r33),
-    )
 
 
 # -- for Python ----------------------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from scipy.signal import lfilter, savgol_filter
 from flownav.core.measurement import Array
 from flownav.lab.optics.firmware import Firmware
 from flownav.lab.optics.flow import compensated, velocities
-from flownav.sensors.rangefinder import RangefinderState, smooth_range
+from flownav.sensors.range_sensor import RangefinderState, smooth_range
 
 GYRO_SAMPLE_S = 1.0 / 760.0
 GYRO_BANDWIDTH_HZ = 30.0

@@ -8,7 +8,7 @@ from flownav.live.reception import Vehicle
 from flownav.live.setup.compare import Block, Row, blocks_of, port_names, port_of, rows_of, source_set
 from flownav.live.setup.knowledge import Knowledge, knowledge_of
 from flownav.live.setup.talk import Change, Talk, read, why_not, write
-from flownav.logs.mavlink.parameters import Value
+from flownav.logs.mavlink.framing import Value
 
 MEET_S = 10.0  # chosen: ten HEARTBEATs
 ENABLING = ("VISO_TYPE", "PLND_ENABLED")  # ArduPilot shows the rest of the group once these are set

@@ -6,14 +6,14 @@ The port that we speak over is found by its baud rate.
 from typing import NamedTuple
 
 from flownav.live.setup.knowledge import SETS, Arming, Knowledge, Wanted
-from flownav.logs.mavlink.parameters import Value
+from flownav.logs.mavlink.framing import Value
 
 ARDUPILOT_PORTS = range(1, 8)
 MAVLINK_PROTOCOLS = (1, 2)
 PX4_INSTANCES = range(3)
 PX4_PORTS = {101: "TEL1", 102: "TEL2", 103: "TEL3", 104: "TEL4", 6: "URT6", 201: "GPS1", 202: "GPS2"}  # MAV_n_CONFIG
-FAST = 460_800  # baud at which all that flownav asks for fits
-SLOW = "{} baud carry {} bytes/s each way: rates are reduced to fit (docs/how-to/live.md). Change both ends"
+FAST_BAUD = 460_800  # baud at which all that flownav asks for fits
+SLOW_LINE = "{} baud carry {} bytes/s each way: rates are reduced to fit (docs/how-to/live.md). Change both ends"
 SERIAL_SOURCE = "libraries/AP_SerialManager/AP_SerialManager.cpp (n_PROTOCOL, n_BAUD)"
 MAV_SOURCE = "src/modules/mavlink/module.yaml (MAV_${i}_RATE); docs serial_configuration"
 EXTERNAL_NAV = 6  # AP_NavEKF_Source
@@ -66,7 +66,7 @@ def _serial(values: dict[str, Value], baud: int) -> Port:
         Wanted(
             name=f"SERIAL{n}_BAUD", level="advised", one_of=(460, 500, 921, 1500), meaning="460800 baud or faster",
             reboot=True, source=SERIAL_SOURCE,
-            why=SLOW.format(baud, baud // 10),
+            why=SLOW_LINE.format(baud, baud // 10),
         )
         for n in found
     ]  # fmt: skip
@@ -89,12 +89,12 @@ def _instances(values: dict[str, Value], baud: int) -> Port:
                 why="0 allows half of the line, and a number its own sum: beyond it PX4 slows every stream down",
             )
         )  # fmt: skip
-        if baud < FAST:
+        if baud < FAST_BAUD:
             rows.append(
                 Wanted(
-                    name=f"SER_{port}_BAUD", level="advised", at_least=FAST, unit="baud", reboot=True,
+                    name=f"SER_{port}_BAUD", level="advised", at_least=FAST_BAUD, unit="baud", reboot=True,
                     source=MAV_SOURCE,
-                    why=SLOW.format(baud, baud // 10),
+                    why=SLOW_LINE.format(baud, baud // 10),
                 )
             )  # fmt: skip
     return Port(found, rows)

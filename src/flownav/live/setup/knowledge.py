@@ -3,8 +3,7 @@
 from typing import Literal
 
 from flownav.core.parameter_files import ParameterModel, load, shipped
-from flownav.logs.mavlink.framing import ARDUPILOT, PX4
-from flownav.logs.mavlink.parameters import Value
+from flownav.logs.mavlink.framing import ARDUPILOT, PX4, Value
 
 MAKES = {ARDUPILOT: "setup/ardupilot.toml", PX4: "setup/px4.toml"}
 SETS = (1, 2, 3)  # ArduPilot's source sets

@@ -10,12 +10,11 @@ from typing import Any, NamedTuple
 
 from flownav.live.link import Link, waited
 from flownav.live.reception import Reception, Vehicle
-from flownav.logs.mavlink.framing import Message, coder
+from flownav.logs.mavlink.framing import Message, Value, coder, decoded, encoded, name_of, request_read, set_value
 from flownav.logs.mavlink.outgoing import ODOMETRY_COMPONENT, companion_heartbeat
-from flownav.logs.mavlink.parameters import Value, decoded, encoded, name_of, request_read, set_value
 from flownav.logs.mavlink.signing import sign_outgoing
 
-ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
+ARMED_FLAG = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 FRESH_S = 3.0  # an older HEARTBEAT does not say whether the vehicle is armed: chosen, three of them
 WAIT_S = 0.02  # chosen
 HEARTBEAT_S = 1.0
@@ -23,7 +22,7 @@ AT_ONCE = 4  # requests under way: an autopilot's queue is short, and so is a sl
 ANSWER_S = 0.5
 TRIES = 8  # at 30 % loss each way one in 200 is still missed
 LIMIT_S = 60.0  # chosen: reading ends although much never answers (test_live_setup)
-UNKNOWN = 1  # MAV_PARAM_ERROR_DOES_NOT_EXIST
+UNKNOWN_PARAMETER = 1  # MAV_PARAM_ERROR_DOES_NOT_EXIST
 
 
 class Talk:
@@ -77,7 +76,7 @@ class Talk:
                 self._link.believe(sender)
         for message in messages:
             if message.msgname == "HEARTBEAT":
-                self._armed, self._armed_s = bool(message.base_mode & ARMED), self.clock()
+                self._armed, self._armed_s = bool(message.base_mode & ARMED_FLAG), self.clock()
         if self.vehicle is not None:
             self.mav.srcSystem = self.vehicle.system
         return messages
@@ -134,7 +133,7 @@ def read(talk: Talk, names: list[str], limit_s: float = LIMIT_S) -> dict[str, Va
         for message in talk.hear():
             if message.msgname == "PARAM_VALUE" and name_of(message) in tries:
                 values[name_of(message)] = decoded(message, vehicle.make)
-            elif message.msgname != "PARAM_ERROR" or message.error != UNKNOWN:
+            elif message.msgname != "PARAM_ERROR" or message.error != UNKNOWN_PARAMETER:
                 continue
             if name_of(message) in left:
                 left.remove(name_of(message))

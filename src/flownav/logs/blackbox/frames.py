@@ -17,7 +17,7 @@ FRAME_I, FRAME_P, FRAME_S, FRAME_G, FRAME_H, FRAME_E = 73, 80, 83, 71, 72, 69
 LONGEST_FRAME = 1024
 LEAST_FRAME = 8  # bytes of a main or a GPS frame, on average, at the least
 SYNC_BEEP, ADJUSTMENT, RESUME, DISARM, FLIGHT_MODE, LOG_END = 0, 13, 14, 15, 30, 255
-LAST = -2  # the log ends here
+ENDED = -2  # the log ends here
 MIN_THROTTLE, BATTERY, MIN_MOTOR = 0, 1, 2  # places in `levels`
 
 
@@ -187,7 +187,7 @@ def event_end(content: Bytes, pos: int, end: int) -> int:
         _, pos = signed_vb(content, pos + 1, end)
         return pos
     elif kind == LOG_END:
-        return LAST
+        return ENDED
     else:
         return -1
     for _ in range(numbers):
@@ -198,7 +198,7 @@ def event_end(content: Bytes, pos: int, end: int) -> int:
 
 @kernel
 def frame_end(content: Bytes, pos: int, end: int, kinds: Kinds, m: Memory, base: Base, motor: int) -> int:
-    """Where the frame at `pos` ends, with its values in the memory; -1 where it is none, LAST where the log ends."""
+    """Where the frame at `pos` ends, with its values in the memory; -1 where it is none, ENDED where the log ends."""
     kind, pos = int(content[pos]), pos + 1
     if kind == FRAME_I:
         return frame_values(content, pos, end, kinds.i, Earlier(m.last, m.before), base, motor, m.now)
@@ -251,7 +251,7 @@ def decode(
     while pos < end and rows < len(kept.main):
         kind = int(content[pos])
         after = frame_end(content, pos, end, kinds, m, Base(levels, home, clock, part), places.motor)
-        if after == LAST:
+        if after == ENDED:
             break
         whole = after >= 0
         if whole and after < end:

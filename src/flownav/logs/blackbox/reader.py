@@ -16,15 +16,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import Table
 from flownav.logs.assembly import MOST_BYTES, Origin, content_of, gps_streams, sensor_stream, sha256_of
 from flownav.logs.blackbox.format import Header, headers
 from flownav.logs.blackbox.frames import Frames, read_frames
-from flownav.logs.frames import frd, ned_from_frd_of_nwu, state_table
-from flownav.logs.log import Log, absences_of
+from flownav.logs.log import Log, absences_of, frd, ned_from_frd_of_nwu, state_table
 from flownav.logs.plausible import of_one_clock
 
 US, CM, DEG_E7, DECIDEGREE = 1e-6, 1e-2, 1e-7, 0.1
@@ -57,7 +56,9 @@ def read_blackbox(path: Path, *, flow_instance: int | None = None) -> Log:
     flow instance is asked for.
     """
     if flow_instance is not None:
-        raise InputError(f"--flow-instance: {path} is a blackbox log, with one flow sensor at most; leave it out")
+        raise InputError(
+            f"{arg('flow_instance')}: {path} is a blackbox log, with one flow sensor at most; leave it out"
+        )
     content = content_of(path, "a blackbox log", MOST_BYTES)
     found = headers(content)
     if not found:
@@ -214,7 +215,7 @@ def _estimate(frames: Frames, t_s: Array, attitude: Stream | None) -> Table | No
     up_is_down = np.array([1.0, 1.0, -1.0])
     turned = None
     if attitude is not None and len(attitude) > 1:
-        from flownav.logs.frames import attitude_at
+        from flownav.logs.log import attitude_at
 
         turned = attitude_at(attitude, t_s[rows])
     return state_table(t_s[rows], CM * place[rows] * up_is_down, CM * speed[rows] * up_is_down, turned)

@@ -12,17 +12,7 @@ from flownav.core.errors import InputError
 from flownav.core.guard import an_input
 from flownav.core.measurement import Array
 from flownav.logs.csv_table import Column, CsvTable, check_clock, check_finite
-from flownav.logs.dataflash.formats import (
-    DIVISORS,
-    Bytes,
-    Format,
-    Indices,
-    chain_messages,
-    find_headers,
-    read_formats,
-    records,
-    with_units,
-)
+from flownav.logs.dataflash import formats
 
 Columns = dict[str, NDArray[Any]]
 DESCRIBING: tuple[str, ...] = ("UNIT", "MULT", "FMTU")
@@ -40,17 +30,17 @@ class DataFlash:
         """Find every message. InputError where the file cannot be read or holds none."""
         self.path = path
         self._content = _content(path)
-        headers = find_headers(self._content)
-        self.formats, self.contradictions = read_formats(self._content, headers)
+        headers = formats.find_headers(self._content)
+        self.formats, self.contradictions = formats.read_formats(self._content, headers)
         length = np.zeros(256, np.int64)
         for known in self.formats.values():
             length[known.type] = known.dtype.itemsize
-        self._scan = chain_messages(self._content, headers, length)
+        self._scan = formats.chain_messages(self._content, headers, length)
         self.skipped_bytes, self.gaps = self._scan.skipped_bytes, self._scan.gaps
         describing: dict[str, NDArray[np.void]] = {
             name: self._rows(name) for name in DESCRIBING if name in self.formats
         }
-        self.formats = with_units(self.formats, describing)
+        self.formats = formats.with_units(self.formats, describing)
         self._counts = np.bincount(self._scan.type, minlength=256)
         if self._counts.sum() <= self.count("FMT"):
             raise InputError(
@@ -100,7 +90,7 @@ class DataFlash:
         if sliced:
             t_s = self._field(known, "TimeUS", at) * 1e-6
             at = at[(t_s >= (-np.inf if t0_s is None else t0_s)) & (t_s < (np.inf if t1_s is None else t1_s))]
-        rows = records(self._content, known.dtype)[at]
+        rows = formats.records(self._content, known.dtype)[at]
         return {label: _converted(rows[label], known.code(label)) for label in wanted}
 
     def instances(self, name: str) -> list[int]:
@@ -111,14 +101,14 @@ class DataFlash:
         found = np.unique(self._field(known, known.instance, self._offsets(known)))
         return [int(value) for value in found] if found.dtype.kind in "iu" else []
 
-    def _offsets(self, known: Format) -> Indices:
+    def _offsets(self, known: formats.Format) -> formats.Indices:
         return np.asarray(self._scan.offset[self._scan.type == known.type])
 
     def _rows(self, name: str) -> NDArray[np.void]:
         known = self.formats[name]
-        return np.asarray(records(self._content, known.dtype)[self._offsets(known)])
+        return np.asarray(formats.records(self._content, known.dtype)[self._offsets(known)])
 
-    def _field(self, known: Format, label: str, at: Indices) -> NDArray[Any]:
+    def _field(self, known: formats.Format, label: str, at: formats.Indices) -> NDArray[Any]:
         kind, place = known.dtype.fields[label][:2]  # type: ignore[index]
         return _converted(_gathered(self._content, np.dtype(kind), at + int(place)), known.code(label))
 
@@ -151,19 +141,19 @@ def _decoded(raw: bytes) -> str:
         return raw.decode("latin-1")
 
 
-def _gathered(content: Bytes, dtype: np.dtype[Any], at: Indices) -> NDArray[Any]:
+def _gathered(content: formats.Bytes, dtype: np.dtype[Any], at: formats.Indices) -> NDArray[Any]:
     count = max(0, len(content) - dtype.itemsize + 1)
     seen: NDArray[Any] = np.ndarray((count,), dtype, buffer=content.data, strides=(1,))
     return np.asarray(seen[at])
 
 
 def _converted(values: NDArray[Any], code: str) -> NDArray[Any]:
-    if code in DIVISORS:
-        return np.asarray(values / DIVISORS[code])
+    if code in formats.DIVISORS:
+        return np.asarray(values / formats.DIVISORS[code])
     return np.ascontiguousarray(values)
 
 
-def _content(path: Path) -> Bytes:
+def _content(path: Path) -> formats.Bytes:
     try:
         with an_input(path).open("rb") as file:
             return np.frombuffer(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ), np.uint8)
@@ -205,6 +195,14 @@ def _scaled(values: NDArray[Any], factor: float) -> Array:
     """In float64, times a factor; a damaged file's signalling NaN or huge number is no warning, the checks see it."""
     with np.errstate(invalid="ignore", over="ignore"):
         return np.asarray(values.astype(float) * factor)
+
+
+def good_rows(log: DataFlash, name: str, fields: Sequence[Field]) -> CsvTable | None:
+    """The checked rows of a kind of message; None where it has none. InputError as `check_rows`."""
+    table = message_rows(log, name, fields)
+    if table is not None:
+        check_rows(table, fields)
+    return table if table is not None and len(table.t_s) else None
 
 
 def check_rows(table: CsvTable, fields: Sequence[Field]) -> None:

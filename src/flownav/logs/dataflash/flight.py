@@ -15,9 +15,8 @@ from flownav.core.record import Table
 from flownav.logs.assembly import Origin, local_ned
 from flownav.logs.csv_table import CsvTable
 from flownav.logs.dataflash import sensors
-from flownav.logs.dataflash.columns import DataFlash, Field, check_rows, held_at, message_rows, text
-from flownav.logs.frames import state_table
-from flownav.logs.log import SIMULATOR, Log, absences_of
+from flownav.logs.dataflash.columns import DataFlash, Field, check_rows, good_rows, held_at, message_rows, text
+from flownav.logs.log import SIMULATOR, Log, absences_of, state_table
 from flownav.logs.plausible import check_plausible
 
 FARTHEST_M, FASTEST_M_S = 1e5, 300.0
@@ -51,12 +50,7 @@ def parameters(log: DataFlash) -> dict[str, float]:
 
 def filter_origins(log: DataFlash) -> CsvTable | None:
     """Where the autopilot's local frame had its origin, and from when."""
-    fields = (*GEODETIC, Field("Type", EKF_ORIGIN, EKF_ORIGIN))
-    table = message_rows(log, "ORGN", fields)
-    if table is None:
-        return None
-    check_rows(table, fields)
-    return table if len(table.t_s) else None
+    return good_rows(log, "ORGN", (*GEODETIC, Field("Type", EKF_ORIGIN, EKF_ORIGIN)))
 
 
 def estimate_rows(log: DataFlash, settings: dict[str, float]) -> tuple[str, CsvTable] | None:
@@ -77,11 +71,8 @@ def estimate_rows(log: DataFlash, settings: dict[str, float]) -> tuple[str, CsvT
 
 def _primary(log: DataFlash, name: str, table: CsvTable) -> Array:
     """The core that flew at each row's time; the lowest one where the log does not say."""
-    fields = (Field("PI", 0, 8),)
-    said = message_rows(log, name, fields)
-    if said is not None:
-        check_rows(said, fields)
-    if said is None or not len(said.t_s):
+    said = good_rows(log, name, (Field("PI", 0, 8),))
+    if said is None:
         return np.full(len(table.t_s), table.columns["C"].min(initial=np.inf))
     return held_at(table.t_s, said.t_s, said.columns["PI"])
 
@@ -99,13 +90,8 @@ def estimate(table: CsvTable, origins: CsvTable | None, origin: Origin | None) -
 
 def true_rows(log: DataFlash) -> tuple[CsvTable, CsvTable | None] | None:
     """A simulator's SIM rows (geodetic position and attitude) and SIM2 rows (position and velocity)."""
-    tables = []
-    for name, fields in (("SIM", TRUE_STATE), ("SIM2", POSITION_VELOCITY)):
-        table = message_rows(log, name, fields)
-        if table is not None:
-            check_rows(table, fields)
-        tables.append(table if table is not None and len(table.t_s) else None)
-    return (tables[0], tables[1]) if tables[0] is not None else None
+    state, motion = good_rows(log, "SIM", TRUE_STATE), good_rows(log, "SIM2", POSITION_VELOCITY)
+    return None if state is None else (state, motion)
 
 
 def truth(state: CsvTable, motion: CsvTable | None, origin: Origin) -> Table:

@@ -17,13 +17,13 @@ from flownav.core.measurement import Array, Sensor, Stream
 from flownav.logs.assembly import Origin, local_ned, near_the_rest
 from flownav.logs.csv_table import CsvTable
 from flownav.logs.dataflash.columns import DataFlash, Field, check_rows, message_rows
-from flownav.logs.frames import attitude_at
+from flownav.logs.log import attitude_at
 
 GYRO_LIMIT_RAD_S = 70.0  # twice the range of a 2000 deg/s gyro
 RANGE_GOOD, FACING_DOWN = 4, 25  # RangeFinder::Status::Good, ROTATION_PITCH_270
 LEAST_FIX = 3  # GPS_OK_FIX_3D
 LANDED_BY_EVENT = {11: 1.0, 18: 1.0, 28: 0.0}  # disarmed, land complete, not landed (AP_Logger's LogEvent)
-MILLIGAUSS = 1e-3
+GAUSS_PER_MILLIGAUSS = 1e-3
 
 # of several sensors the one with the most rows of this kind: a GPS in use, flow with data, range downward
 PREFERRED: dict[str, tuple[str, Callable[[NDArray[Any]], NDArray[np.bool_]]]] = {
@@ -59,7 +59,7 @@ FIELDS: dict[str, tuple[Field, ...]] = {
     ),
     "BARO": (Field("Alt", -1000, 20000), Field("Health", 0, 255, required=False)),
     "MAG": (
-        *(Field(f"Mag{axis}", -20, 20, factor=MILLIGAUSS) for axis in "XYZ"),
+        *(Field(f"Mag{axis}", -20, 20, factor=GAUSS_PER_MILLIGAUSS) for axis in "XYZ"),
         Field("Health", 0, 255, required=False),
     ),
     "EV": (Field("Id", 0, 255),),

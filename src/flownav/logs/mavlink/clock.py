@@ -25,7 +25,7 @@ AGREEMENT_S = 1.0
 CONFIRMATIONS = 3
 LONGEST_WAIT_S = 1.0  # an unstamped message follows its stamped predecessor by no more than this
 LONGEST_PAUSE_S = 86400.0  # arrivals further apart than this are a damaged arrival time
-DRIFT = 200e-6  # of one crystal against another
+CRYSTAL_DRIFT = 200e-6  # of one crystal against another
 
 ClockName = tuple[int, int, str]  # system, component, "boot" or "unix"
 
@@ -97,7 +97,7 @@ def align(state: ClockState, arrival_s: float, stamp: Stamp | None) -> tuple[Clo
     offset = clock.offset_s
     if not rules:
         advance = max(reading - clock.stamp_s, 0.0)
-        offset = min(offset + DRIFT * advance, now - reading)
+        offset = min(offset + CRYSTAL_DRIFT * advance, now - reading)
     newest = max(reading, clock.stamp_s)
     late = reading < clock.stamp_s
     state, aligned = _heard(state, stamp.clock, _Clock(offset, newest, wraps), arrival_s, rules and not late, event)

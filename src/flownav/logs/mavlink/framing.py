@@ -7,11 +7,16 @@ length in a file can claim more. The dialect ardupilotmega includes all of MAVLi
 MAVLink 1: FE, length, sequence, system, component, id, payload, checksum.
 MAVLink 2: FD, length, incompatibility flags, compatibility flags, sequence, system, component, id (3 bytes),
 payload, checksum, and a signature of 13 bytes where flag 1 is set.
+
+A parameter is one float field that two makes fill in two ways: ArduPilot casts every number to float; PX4 copies the
+bytes of an integer into the field (mavlink.io, services/parameter, "Parameter encoding": C-cast and bytewise).
+PARAM_VALUE says the type. Read as the other, PX4's 5 is 7e-45, and a 5.0 written to PX4 becomes 1084227584.
 """
 
 from __future__ import annotations
 
 import re
+import struct
 from collections import Counter
 from collections.abc import Callable, Iterator
 from types import ModuleType
@@ -26,7 +31,7 @@ Message = Any  # a message that pymavlink decoded or built
 MAVLINK_1, MAVLINK_2 = 0xFE, 0xFD
 HEADER_1, HEADER_2 = 6, 10
 CHECKSUM_BYTES, SIGNATURE_BYTES = 2, 13
-SIGNED = 0x01
+SIGNED_FLAG = 0x01
 TIMESTAMP_BYTES = 8
 LARGEST_FRAME = HEADER_2 + 255 + CHECKSUM_BYTES + SIGNATURE_BYTES
 OPEN_END = re.compile(rb"\xfd.{0,8}\Z", re.DOTALL)  # the beginning of a header whose rest is still to come
@@ -150,7 +155,7 @@ class Check:
             return "truncated"
         length, signed = content[start + 1], False
         if header == HEADER_2:
-            if content[start + 2] & ~SIGNED:
+            if content[start + 2] & ~SIGNED_FLAG:
                 return "no_header"
             signed = bool(content[start + 2])
             system, component = content[start + 5], content[start + 6]
@@ -173,3 +178,54 @@ class Check:
         arrival = b"" if timestamp is None else content[timestamp : timestamp + TIMESTAMP_BYTES]
         arrival_us = int.from_bytes(arrival, "big")
         return Frame(start, end, arrival_us, message_id, system, component, signed)
+
+
+REAL32 = 9  # MAV_PARAM_TYPE
+INTEGERS = {1: "<B", 2: "<b", 3: "<H", 4: "<h", 5: "<I", 6: "<i"}  # MAV_PARAM_TYPE: its bytes
+
+
+class Value(NamedTuple):
+    """A parameter's number, and its type (MAV_PARAM_TYPE)."""
+
+    number: float
+    kind: int = REAL32
+
+
+def bytewise(make: int) -> bool:
+    """Whether a make (MAV_AUTOPILOT) copies integers' bytes."""
+    return make == PX4
+
+
+def decoded(message: Message, make: int) -> Value:
+    """The number of a PARAM_VALUE that arrived. Integers' bytes are read in its frame: a NaN may not keep them."""
+    kind = int(message.param_type)
+    if bytewise(make) and kind in INTEGERS:
+        frame = bytes(message.get_msgbuf())
+        start = HEADER_2 if frame[0] == MAVLINK_2 else HEADER_1  # param_value is the first field on the wire
+        return Value(float(struct.unpack_from(INTEGERS[kind], frame, start)[0]), kind)
+    number = float(message.param_value)
+    return Value(float(f"{number:.7g}") if kind == REAL32 else number, kind)  # 0.2, not the double next to its float
+
+
+def encoded(value: Value, make: int) -> float:
+    """The float field that carries a value to a make. struct.error where an integer type cannot hold it."""
+    if bytewise(make) and value.kind in INTEGERS:
+        content = struct.pack(INTEGERS[value.kind], round(value.number))
+        return float(struct.unpack("<f", content.ljust(4, b"\0"))[0])
+    return float(round(value.number)) if value.kind in INTEGERS else value.number
+
+
+def name_of(message: Message) -> str:
+    """The name in a PARAM_ message."""
+    found = message.param_id
+    return (found.decode("ascii", "replace") if isinstance(found, bytes) else str(found)).rstrip("\0")
+
+
+def request_read(mav: Any, system: int, component: int, name: str) -> Message:
+    """PARAM_REQUEST_READ by name."""
+    return mav.param_request_read_encode(system, component, name.encode("ascii"), -1)
+
+
+def set_value(mav: Any, system: int, component: int, name: str, value: Value, make: int) -> Message:
+    """PARAM_SET in the make's way."""
+    return mav.param_set_encode(system, component, name.encode("ascii"), encoded(value, make), value.kind)

@@ -22,13 +22,7 @@ from typing import Any
 
 from flownav.core.errors import InputError
 from flownav.core.guard import an_input
-from flownav.logs.mavlink.framing import (
-    CHECKSUM_BYTES,
-    HEADER_2,
-    MAVLINK_2,
-    SIGNATURE_BYTES,
-    SIGNED,
-)
+from flownav.logs.mavlink import framing
 
 KEY_BYTES = 32
 EPOCH_UNIX_S = 1_420_070_400  # 2015-01-01 UTC
@@ -119,13 +113,18 @@ class SignatureCheck:
         return True
 
     def _reason(self, frame: bytes) -> str:
-        least = HEADER_2 + CHECKSUM_BYTES + SIGNATURE_BYTES
-        if len(frame) < least or frame[0] != MAVLINK_2 or not frame[2] & SIGNED or len(frame) != least + frame[1]:
+        least = framing.HEADER_2 + framing.CHECKSUM_BYTES + framing.SIGNATURE_BYTES
+        if (
+            len(frame) < least
+            or frame[0] != framing.MAVLINK_2
+            or not frame[2] & framing.SIGNED_FLAG
+            or len(frame) != least + frame[1]
+        ):
             return "unsigned"
         expected = hashlib.sha256(self._key + frame[:-6]).digest()[:6]
         if not hmac.compare_digest(expected, frame[-6:]):
             return "bad_signature"
-        link, low, high = struct.unpack("<BIH", frame[-SIGNATURE_BYTES:-6])
+        link, low, high = struct.unpack("<BIH", frame[-framing.SIGNATURE_BYTES : -6])
         timestamp, stream = low | high << 32, (link, frame[5], frame[6])
         self._newest = max(self._newest, timestamp_at(self._clock() + self._unix_less_clock_s))
         oldest = self._streams.get(stream, self._newest - NEW_STREAM_TICKS - 1)

@@ -25,7 +25,7 @@ from flownav.logs.ulog import FIELDS, STATES, TOPICS, log_of_topics
 from flownav.logs.ulog_topics import Topic, Topics, count_from_first
 
 PACKAGE = "px4_msgs/msg/"
-US = 1e-6
+S_PER_US = 1e-6
 LACKING = {
     "attitude": "no attitude (an orientation in sensor_msgs/Imu, px4_msgs/VehicleAttitude)",
     "imu": "no IMU (sensor_msgs/Imu, px4_msgs/SensorCombined)",
@@ -34,7 +34,7 @@ LACKING = {
     "baro": "no barometer (sensor_msgs/FluidPressure, px4_msgs/VehicleAirData)",
     "flow_rate": "no optical flow (mavros_msgs/OpticalFlowRad, px4_msgs/VehicleOpticalFlow)",
 }
-SHOWN = 8  # topics in a message
+TOPICS_SHOWN = 8  # topics in a message
 
 
 def px4_topic(topic: str, kind: str) -> str:
@@ -71,9 +71,9 @@ def px4_topics(gathered: list[Gathered], sha256: str, states: tuple[str, ...]) -
     for each in sorted(gathered, key=lambda topic: topic.topic):
         name = px4_topic(each.topic, each.kind)
         columns = {field: each.column(field)[:, 0] for field in each.names}
-        t_s = US * columns.pop("timestamp")
+        t_s = S_PER_US * columns.pop("timestamp")
         if "timestamp_sample" in columns:
-            columns["sample_s"] = US * columns.pop("timestamp_sample")
+            columns["sample_s"] = S_PER_US * columns.pop("timestamp_sample")
         topic = Topic(t_s, columns, name=name, instance=count.get(name, 0))
         count[name] = topic.instance + 1
         found.append(topic)
@@ -97,7 +97,7 @@ def read_ros(path: Path, *, flow_instance: int | None = None, topics: Mapping[st
     gathered = _gathered(files, bag, decoder)
     if not gathered:
         kinds = sorted({f"{channel.topic} ({channel.kind})" for channel in bag.channels})
-        listed = ", ".join(kinds[:SHOWN]) + (" ..." if len(kinds) > SHOWN else "") or "nothing"
+        listed = ", ".join(kinds[:TOPICS_SHOWN]) + (" ..." if len(kinds) > TOPICS_SHOWN else "") or "nothing"
         why = f"; of {', '.join(sorted(decoder.undefined))} it lacks the definition" if decoder.undefined else ""
         raise InputError(f"{path}: no message of a known type{why}; the bag holds {listed}")
     inputs = {file.name: hash_of(file) for file in files}

@@ -10,7 +10,7 @@ import numpy as np
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, Table
 from flownav.logs.assembly import Origin, counted, gps_streams, pressure_altitude_m, sensor_stream
-from flownav.logs.frames import frd, in_order, ned, ned_from_frd, state_table
+from flownav.logs.log import frd, in_order, ned, ned_from_frd, state_table
 from flownav.logs.ros.topics import POSE, QUATERNION, Clock, Gathered
 
 GAUSS_PER_TESLA = 1e4

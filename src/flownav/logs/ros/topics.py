@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.errors import InputError
+from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 
 ODOMETRY, POSE_STAMPED = "nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped"
 POSES = (POSE_STAMPED, "geometry_msgs/msg/PoseWithCovarianceStamped", "geometry_msgs/msg/TransformStamped", ODOMETRY)
-NS = 1e-9
+S_PER_NS = 1e-9
 AGREEING_S = 3600.0  # headers of one clock; a simulator's clock may lie decades from the recorder's
 LONGEST_DELAY_S = 1.0
 
@@ -34,7 +34,7 @@ def _pose(position: str, orientation: str) -> dict[str, str]:
 
 
 # what is kept of each type: columns by name, and where each lies in the message
-KEPT: dict[str, dict[str, str]] = {
+FIELDS_READ: dict[str, dict[str, str]] = {
     "sensor_msgs/msg/Imu": {
         **_xyz("gyro_", "angular_velocity"), **_xyz("accel_", "linear_acceleration"),
         **_xyz("q", "orientation", axes="wxyz"), "no_orientation": "orientation_covariance",
@@ -59,8 +59,8 @@ KEPT: dict[str, dict[str, str]] = {
                      "quality", "distance")
     },
 }  # fmt: skip
-NAMES = {kind: tuple(columns) for kind, columns in KEPT.items()}
-READ: dict[str, Values] = {kind: attrgetter(*columns.values()) for kind, columns in KEPT.items()}
+NAMES = {kind: tuple(columns) for kind, columns in FIELDS_READ.items()}
+VALUES_READ: dict[str, Values] = {kind: attrgetter(*columns.values()) for kind, columns in FIELDS_READ.items()}
 
 
 @dataclass
@@ -112,7 +112,7 @@ def stamp_of(message: Any) -> int:
 
 def values_of(kind: str, message: Any) -> tuple[float, ...]:
     """What is kept of a message, in the order of NAMES[kind]; of covariances what says that there are none."""
-    values = READ[kind](message)
+    values = VALUES_READ[kind](message)
     if kind == "sensor_msgs/msg/Imu":
         values = (*values[:10], *(covariance[0] == -1.0 for covariance in values[10:]))
     elif kind == "sensor_msgs/msg/NavSatFix":
@@ -134,7 +134,7 @@ class Role(NamedTuple):
 
 TRUE_WORDS = ("mocap", "vicon", "optitrack", "vrpn", "qualisys", "ground_truth", "groundtruth", "truth", "leica", "gt")
 OWN_WORDS = ("local_position", "estimat", "ekf", "fused", "filtered", "odom")
-AHEAD = ("front", "forward", "left", "right", "back", "rear", "upward")
+NOT_DOWN = ("front", "forward", "left", "right", "back", "rear", "upward")
 ROLES = (
     Role(
         "imu", ("sensor_msgs/msg/Imu",), ("imu/data_raw", "imu"), ("camera", "realsense", "lidar", "ouster", "velodyne")
@@ -143,7 +143,7 @@ ROLES = (
     Role("gps_velocity", ("geometry_msgs/msg/TwistStamped",), ("gps", "gnss", "fix"), named=True),
     Role("baro", ("sensor_msgs/msg/FluidPressure",), ("static", "baro", "pressure"), ("diff", "airspeed")),
     Role("mag", ("sensor_msgs/msg/MagneticField",)),
-    Role("range", ("sensor_msgs/msg/Range",), ("down", "ground", "rangefinder", "lidar", "sonar", "height"), AHEAD),
+    Role("range", ("sensor_msgs/msg/Range",), ("down", "ground", "rangefinder", "lidar", "sonar", "height"), NOT_DOWN),
     Role("flow", ("mavros_msgs/msg/OpticalFlowRad",)),
     Role("truth", POSES, TRUE_WORDS, OWN_WORDS),
     Role("autopilot", POSES, OWN_WORDS, TRUE_WORDS, named=True),
@@ -157,7 +157,7 @@ def asked_topics(texts: Iterable[str]) -> dict[str, str]:
         role, _, topic = text.partition("=")
         if not topic or role in found:
             why = "is the second for its role" if topic else "ROLE=TOPIC is needed"
-            raise InputError(f"--topic {text}: {why}; the roles are {', '.join(each.name for each in ROLES)}")
+            raise InputError(f"{arg('topics')} {text}: {why}; the roles are {', '.join(each.name for each in ROLES)}")
         found[role] = topic
     return found
 
@@ -183,7 +183,7 @@ def chosen(
         if role.name == "flow" and flow_instance is not None:
             if not 0 <= flow_instance < len(fitting):
                 names = ", ".join(f"{k} ({topic.topic})" for k, topic in enumerate(fitting)) or "none"
-                raise InputError(f"--flow-instance {flow_instance}: the bag's flow topics are {names}")
+                raise InputError(f"{arg('flow_instance')} {flow_instance}: the bag's flow topics are {names}")
             fitting = [fitting[flow_instance]]
         taken, why = _best(role, [topic for topic in fitting if topic.topic not in asked.values()])
         if taken is None:
@@ -218,11 +218,11 @@ def _check_asked(asked: Mapping[str, str], listed: list[Gathered]) -> None:
     roles = {role.name: role for role in ROLES}
     for name, topic in asked.items():
         if name not in roles:
-            raise InputError(f"--topic {name}={topic}: the roles are {', '.join(roles)}")
+            raise InputError(f"{arg('topics')} {name}={topic}: the roles are {', '.join(roles)}")
         fitting = [each.topic for each in listed if each.kind in roles[name].kinds]
         if topic not in fitting:
             raise InputError(
-                f"--topic {name}={topic}: no such topic; for {name} the bag has {', '.join(fitting) or 'none'}"
+                f"{arg('topics')} {name}={topic}: no such topic; for {name} the bag has {', '.join(fitting) or 'none'}"
             )
 
 
@@ -239,8 +239,8 @@ class Clock(NamedTuple):
     def times(self, topic: Gathered) -> Array:
         """When each message arrived [s]: its stamp and the topic's usual delay, or when it was logged."""
         if topic.topic in self.by_header:
-            return np.asarray((topic.stamped - self.start_ns) * NS + self.delay_s(topic), np.float64)
-        return np.asarray((topic.logged - self.offset_ns - self.start_ns) * NS, np.float64)
+            return np.asarray((topic.stamped - self.start_ns) * S_PER_NS + self.delay_s(topic), np.float64)
+        return np.asarray((topic.logged - self.offset_ns - self.start_ns) * S_PER_NS, np.float64)
 
     def delay_s(self, topic: Gathered) -> float:
         """How old a reading is on arrival [s]."""
@@ -256,7 +256,7 @@ def clock_of(topics: Iterable[Gathered]) -> tuple[Clock, list[str]]:
         if np.mean(topic.stamped > 0) > 0.5
     }
     notes = []
-    if late_ns and (max(late_ns.values()) - min(late_ns.values())) * NS > AGREEING_S:
+    if late_ns and (max(late_ns.values()) - min(late_ns.values())) * S_PER_NS > AGREEING_S:
         notes.append("the headers' stamps are of different clocks: the times at which messages were logged are taken")
         late_ns = {}
     unstamped = sorted(topic.topic for topic in listed if topic.topic not in late_ns)
@@ -264,9 +264,9 @@ def clock_of(topics: Iterable[Gathered]) -> tuple[Clock, list[str]]:
         notes.append(f"no stamp in the headers of {', '.join(unstamped)}: the times of logging are taken")
     elif unstamped and not notes:
         notes.append("no stamps in the headers: the times at which messages were logged are taken")
-    one_clock = all(abs(late) * NS < LONGEST_DELAY_S for late in late_ns.values())
+    one_clock = all(abs(late) * S_PER_NS < LONGEST_DELAY_S for late in late_ns.values())
     offset_ns = 0 if one_clock else int(min(late_ns.values()))
-    delays = {name: min(max((late - offset_ns) * NS, 0.0), LONGEST_DELAY_S) for name, late in late_ns.items()}
+    delays = {name: min(max((late - offset_ns) * S_PER_NS, 0.0), LONGEST_DELAY_S) for name, late in late_ns.items()}
     starts = [
         int(topic.stamped[topic.stamped > 0].min()) if topic.topic in late_ns else int(topic.logged.min()) - offset_ns
         for topic in listed

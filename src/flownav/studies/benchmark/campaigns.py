@@ -15,7 +15,7 @@ from flownav.campaigns.plan import Plan, planned
 from flownav.campaigns.run import run_campaign
 from flownav.campaigns.store import PART, Store
 from flownav.simulation.scenario import load_scenario
-from flownav.studies.benchmark.figure import Figure
+from flownav.studies.benchmark import Figure
 
 ROUNDS = 3
 MEMORY_FLIGHTS = (1024, 10_000)
@@ -26,7 +26,8 @@ def campaigns(flights: int) -> list[Figure]:
     """Rates with scores and store, what store and resume add, Ray's overhead, and memory."""
     count = max(PART, flights // PART * PART)
     paper, navigator = _plan("paper", count), _plan("landing", max(64, flights // NAVIGATORS_SHARE))
-    bare, stored, again = _by_turns([lambda: _bare(paper), lambda: _stored(paper), lambda: _stored(paper, twice=True)])
+    works = [lambda: _fly(paper, Local()), lambda: _stored(paper), lambda: _stored(paper, twice=True)]
+    bare, stored, again = _by_turns(works)
     what = "campaign flights a second, scored and stored"
     note = f"{paper.flights} flights, ensemble"
     figures = [
@@ -62,10 +63,6 @@ def _fly(plan: Plan, engine: Engine) -> float:
     return time.perf_counter() - began
 
 
-def _bare(plan: Plan) -> float:
-    return _fly(plan, Local())
-
-
 def _stored(plan: Plan, *, twice: bool = False) -> float:
     """How long a campaign takes with its folder [s]; twice: only the second time, when all is there."""
     folder = Path(tempfile.mkdtemp())
@@ -87,7 +84,7 @@ def _cluster(plan: Plan) -> list[Figure]:
     from flownav.campaigns.engines import RayCluster
 
     cluster = RayCluster()
-    local, ray = _by_turns([lambda: _bare(plan), lambda: _fly(plan, cluster)])
+    local, ray = _by_turns([lambda: _fly(plan, Local()), lambda: _fly(plan, cluster)])
     cluster.close()
     return [
         Figure(

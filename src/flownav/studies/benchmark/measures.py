@@ -15,8 +15,8 @@ from flownav.core.compile import LANES, ONE_LANE
 from flownav.estimation.paper_filter import PaperModel
 from flownav.simulation.engine import fly_blocks, fly_one
 from flownav.simulation.plan import Flight
+from flownav.studies.benchmark import REPEATS, Figure, best_of
 from flownav.studies.benchmark.campaigns import campaigns
-from flownav.studies.benchmark.figure import REPEATS, Figure, best_of
 
 PART_STEPS, PART_ROUNDS = 1000, 50
 NAVIGATORS_SHARE = 4  # the navigator's batch is so many times smaller
@@ -126,7 +126,7 @@ def vehicles(flights: int) -> list[Figure]:
 # -- the filters' steps --------------------------------------------------------------------------------------
 def filter_parts() -> list[Figure]:
     """Prediction, correction, and one that nobody offers, of the navigator's filter: scalar, and a lane of sixteen."""
-    from flownav.studies.benchmark.filters import SETTINGS, correct_often, offer_nothing, predict_often, standing
+    from flownav.studies.benchmark.vehicles import SETTINGS, correct_often, offer_nothing, predict_often, standing
 
     def us_of(part: Callable[..., Any], lanes: tuple[int, ...]) -> float:
         start = standing(lanes)
@@ -152,7 +152,7 @@ def filter_parts() -> list[Figure]:
 
 def _filter_runner() -> Callable[[int], float]:
     """Seconds for n predict+update steps of the paper's filter on one lane."""
-    from flownav.studies.benchmark.filters import PAPER_ROWS, run_paper_filter
+    from flownav.studies.benchmark.vehicles import PAPER_ROWS, run_paper_filter
 
     model = _papers_model()
     work = np.zeros(PAPER_ROWS)
@@ -215,13 +215,9 @@ def replay_of_recorded_flight() -> Iterator[Figure]:
 
 def _subprocess(arguments: list[str], environment: dict[str, str] | None = None) -> float:
     """Wall time [s] of a flownav command as a whole process."""
+    whole = {**os.environ, **(environment or {})}
     start = time.perf_counter()
-    subprocess.run(
-        [sys.executable, "-m", "flownav", *arguments],
-        check=True,
-        capture_output=True,
-        env={**os.environ, **(environment or {})},
-    )
+    subprocess.run([sys.executable, "-m", "flownav", *arguments], check=True, capture_output=True, env=whole)
     return time.perf_counter() - start
 
 

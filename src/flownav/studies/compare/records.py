@@ -1,6 +1,6 @@
 """Records beside each other: the errors of each, and how much each differs from the first one, with an interval."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,9 +8,10 @@ import numpy as np
 from flownav.core.measurement import Array
 from flownav.core.record import POSITION_NED, VELOCITY_BODY, Record
 from flownav.core.text import finite_or_none
-from flownav.scoring.by_phase import errors_of
-from flownav.scoring.percentiles import CONFIDENCE, Difference, mean_difference
+from flownav.report.series import mapping
+from flownav.scoring.landings import CONFIDENCE, mean_difference
 from flownav.scoring.phases import phases_of
+from flownav.scoring.recorded import errors_of
 
 Row = dict[str, Any]
 MEASURES = ("horizontal_m", "vertical_m", "velocity_m_s")
@@ -70,15 +71,10 @@ def in_flight(record: Record, errors: dict[str, tuple[Array, Array]]) -> dict[st
 
 def touchdown_of(record: Record) -> Row:
     """Where the touchdown was [m from the pad's centre] and what it was limited by; None where it was not scored."""
-    scores: Any = record.manifest.get("scores")
-    landing = _mapping(scores.get("touchdown")) if isinstance(scores, Mapping) else {}
-    parts, contact = (_mapping(landing.get(name)) if landing else {} for name in ("limited_by", "contact"))
+    landing = mapping(mapping(record.manifest.get("scores")).get("touchdown"))
+    parts, contact = (mapping(landing.get(name)) for name in ("limited_by", "contact"))
     limits = {name: parts.get(name) for name in ("estimate_m", "guidance_m", "pad_m")}
     return {"touchdown_m": contact.get("distance_m"), "touchdown_limited_by": limits if parts else None}
-
-
-def _mapping(value: Any) -> Mapping[str, Any]:
-    return value if isinstance(value, Mapping) else {}
 
 
 def _rms(found: tuple[Array, Array] | None) -> float | None:
@@ -97,10 +93,8 @@ def _difference(first: dict[str, Any], other: dict[str, Any], measure: str) -> R
         return None
     same = np.interp(t_s, there_s[known], there[known], np.nan, np.nan)
     found = mean_difference(t_s, error, same)
-    return None if found is None else _as_json(found)
-
-
-def _as_json(found: Difference) -> Row:
+    if found is None:
+        return None
     low, high = finite_or_none(found.low), finite_or_none(found.high)
     return {"mean": found.mean, "low": low, "high": high, "confidence": CONFIDENCE}
 

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from flownav.core.frames import heading_from_quaternion, rotation_from_quaternion, to_earth, velocity_from_flow
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, Table
-from flownav.logs.frames import attitude_at
-from flownav.logs.log import Log
+from flownav.logs.log import Log, attitude_at
 from flownav.navigation.rows import EstimateRow
 from flownav.navigation.tables import estimate_table
 from flownav.scoring.path import columns_of, motion_of, velocity_ned

@@ -17,10 +17,9 @@ from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
 from flownav.studies.compare.job import names_of
-from flownav.studies.tuning.judge import UNMOVED, Judged, Judgement, judge
 from flownav.studies.tuning.knobs import Knob, Split, knobs_of, rounded, split_flights, turned
 from flownav.studies.tuning.scores import Course, Gains, Trials, course_of, reference_name
-from flownav.studies.tuning.search import Found, search
+from flownav.studies.tuning.search import UNMOVED, Found, Judged, Judgement, judge, search
 
 RUNS_A_KNOB = 30  # about as many as a search takes, for the progress bar
 
@@ -158,7 +157,7 @@ def write_settings(path: Path, tuned: Tuned, stated: NavigatorSettingsFile | Non
             temporary.write_text(settings_text(tuned, stated, command), encoding="utf-8", errors="backslashreplace")
             load(temporary, NavigatorSettingsFile)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
+        raise InputError(f"{path}: cannot be written ({error.strerror}); give another name") from error
 
 
 def settings_text(tuned: Tuned, stated: NavigatorSettingsFile | None, command: str) -> str:

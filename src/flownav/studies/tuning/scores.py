@@ -28,15 +28,15 @@ from flownav.studies.compare.tracks import Window
 from flownav.studies.tuning.knobs import Knob, turned
 
 STRETCH_S = 5.0  # over which innovations are summed: what lasts longer the filter carries as a state
-HUBER = 3.0  # standard deviations beyond which a surprise counts linearly
+HUBER_SIGMAS = 3.0  # standard deviations beyond which a surprise counts linearly
 GPS_FLOOR_M = 0.4  # what GPS noise and quantisation leave of an outage error, whoever navigates
 TRUTH_FLOOR_M_S = 0.03  # what a differenced truth leaves of a velocity error
 COMPONENTS = 3
 SENSORS = max(Sensor) + 1
 UNSCORED = (Sensor.IMU, Sensor.LANDED)  # what moves the filter, and what is no sensor's reading
-LEAST_SHARE = 0.8  # of the readings that the start could predict: who predicts fewer gets LOSS
-LOSS = -1.0  # nats
-WORTH = 0.02  # nats, 2 % of an error: less is not worth a setting
+LEAST_SHARE = 0.8  # of the readings that the start could predict: who predicts fewer gets LOSS_NATS
+LOSS_NATS = -1.0  # nats
+WORTH_NATS = 0.02  # nats, 2 % of an error: less is not worth a setting
 FLOW_FLOOR_RAD_S = 0.05  # noise of one flow reading at full quality
 AGAINST_GPS, AGAINST_TRUTH, AGAINST_FLOW = "gps cuts", "truth velocity", "flow cuts"
 UNITS = {AGAINST_GPS: "m", AGAINST_TRUTH: "m/s", AGAINST_FLOW: "rad/s"}
@@ -95,13 +95,13 @@ def scores_of(flown: Replay, windows: Sequence[Window]) -> Scores:
 
 
 def gains_of(run: Scores, start: Scores) -> Gains:
-    """What a run has over the start, window by window; what it no longer predicts costs LOSS."""
+    """What a run has over the start, window by window; what it no longer predicts costs LOSS_NATS."""
     counted = np.isfinite(start.density)
-    found = np.where(run.readings >= LEAST_SHARE * start.readings, run.density - start.density, LOSS)
-    found = _tempered(np.where(np.isfinite(found), found, LOSS))
+    found = np.where(run.readings >= LEAST_SHARE * start.readings, run.density - start.density, LOSS_NATS)
+    found = _tempered(np.where(np.isfinite(found), found, LOSS_NATS))
     sensors = np.maximum(counted.sum(axis=1), 1)
     prediction = np.where(counted, found, 0.0).sum(axis=1) / sensors
-    error = _tempered(np.where(np.isfinite(run.log_error), start.log_error - run.log_error, LOSS))
+    error = _tempered(np.where(np.isfinite(run.log_error), start.log_error - run.log_error, LOSS_NATS))
     return Gains(prediction, np.where(np.isfinite(start.log_error), error, np.nan))
 
 
@@ -177,7 +177,7 @@ def _stretches(windows: Sequence[Window]) -> int:
 def _log_density(value: Array, variance: Array) -> Array:
     """Log density of a normal distribution with Huber's tails, but for a constant that is of every scale."""
     z = np.abs(value) / np.sqrt(variance)
-    surprise = np.where(z <= HUBER, 0.5 * z**2, HUBER * z - 0.5 * HUBER**2)
+    surprise = np.where(z <= HUBER_SIGMAS, 0.5 * z**2, HUBER_SIGMAS * z - 0.5 * HUBER_SIGMAS**2)
     return np.asarray(-0.5 * np.log(variance) - surprise)
 
 
@@ -240,8 +240,8 @@ class Course:
         try:
             return gains_of(self.scores(keys), self.start)
         except InputError:
-            lost = np.full(len(self.windows), LOSS)
-            return Gains(lost, np.where(np.isfinite(self.start.log_error), LOSS, np.nan))
+            lost = np.full(len(self.windows), LOSS_NATS)
+            return Gains(lost, np.where(np.isfinite(self.start.log_error), LOSS_NATS, np.nan))
 
 
 def course_of(flown: Replay, windows: Sequence[Window]) -> Course:

@@ -27,7 +27,7 @@ BAROMETER_S = 60.0  # slower errors cannot be told from the smoothed altitude's 
 LATEST_FLOW_S, FLOW_STEP_S = 0.4, 0.01  # lags of the flow that are tried
 LEAST_ROWS = 100  # of flow in flight
 SLOW_SHARE = 0.1  # of the Nyquist frequency: below it white noise has a tenth of its power
-SEGMENT = 256
+SEGMENT_ROWS = 256
 BANDS_HZ = {"0.5_5_hz": (0.5, 5.0), "above_5_hz": (5.0, None)}
 TO_SIGMA = 1.4826  # from a median absolute deviation
 GYRO, ACCEL = slice(0, 3), slice(3, 6)
@@ -119,7 +119,7 @@ def slow_share(values: Array) -> float:
     """Share of the power of (n,) even samples below a tenth of the Nyquist frequency (Welch, mean left in)."""
     if len(values) < 8:
         return float("nan")
-    frequency, power = welch(values, nperseg=min(SEGMENT, len(values)), detrend=False)
+    frequency, power = welch(values, nperseg=min(SEGMENT_ROWS, len(values)), detrend=False)
     return float(power[frequency < 0.5 * SLOW_SHARE].sum() / max(power.sum(), np.finfo(float).tiny))
 
 
@@ -138,13 +138,7 @@ def flow_figures(flown: Replay, smoothed: Smoothed) -> dict[str, float]:
     slant_m = height_m / smoothed.tilt_cosine(stream.t_s)
     ahead = np.column_stack([turned[:, 1], -turned[:, 0]])
     fit = fit_flow(stream.t_s[known], ahead[known], slant_m[known], smoothed)
-    return {
-        "flow_gain": fit.gain,
-        "flow_lag_s": fit.lag_s,
-        "flow_noise_rad_s": fit.noise_rad_s,
-        "flow_noise_lag_one": fit.noise_lag_one,
-        "flow_blind_share": blind,
-    }
+    return {f"flow_{name}": value for name, value in fit._asdict().items()} | {"flow_blind_share": blind}
 
 
 def fit_flow(t_s: Array, ahead_rad_s: Array, slant_m: Array, smoothed: Smoothed) -> FlowFit:

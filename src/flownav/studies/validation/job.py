@@ -24,7 +24,7 @@ DECIDES = ("outage_median_m", "outage_worst_m")
 NEITHER = ("flow_gain", "flow_lag_s")  # larger is not worse
 LESS_IS_WORSE = ("_white",)
 WITH_SIGN = ("_lag_one",)  # of which the size counts
-SHARES = ("_lag_one", "_share", "_lag_s")
+SHARE_ENDINGS = ("_lag_one", "_share", "_lag_s")
 SLACK, SHARE_SLACK = 1.25, 0.02  # a figure this little beyond the simulated flights counts as theirs
 
 
@@ -61,7 +61,7 @@ class Row:
 
     @property
     def _slack(self) -> float:
-        return SHARE_SLACK if self.figure.endswith(SHARES) else 0.0
+        return SHARE_SLACK if self.figure.endswith(SHARE_ENDINGS) else 0.0
 
     def as_json(self) -> dict[str, str | float | None]:
         """What the command prints."""

@@ -1,4 +1,4 @@
-"""A log in figures: its streams, its clock, its limits, what its sensors say of each other, what it lacks."""
+"""Inspection: a log in figures: its streams, clock, limits, what its sensors say of each other, what it lacks."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,8 +11,7 @@ from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import VELOCITY_BODY
 from flownav.lab.identification.first_look import IN_PART, Look, first_look
 from flownav.lab.identification.flight import jumps
-from flownav.logs.frames import attitude_at
-from flownav.logs.log import Log
+from flownav.logs.log import Log, attitude_at
 from flownav.logs.plausible import check_plausible
 from flownav.replays.judged import autopilot_scores, flying_at, obstacles
 from flownav.replays.prepare import ReplayOptions, prepare
@@ -188,9 +187,5 @@ def _of_range(log: Log) -> list[Finding]:
     if share < LEAST_JUMPING:
         return []
     largest = float(np.abs(np.diff(range_m)).max())
-    return [
-        Finding(
-            f"range jumps in {share:.0%} of its steps in flight, by up to {largest:.1f} m: velocities from flow and "
-            f"range are off by {doubt:.0%} or so"
-        )
-    ]
+    jumping = f"range jumps in {share:.0%} of its steps in flight, by up to {largest:.1f} m"
+    return [Finding(f"{jumping}: velocities from flow and range are off by {doubt:.0%} or so")]

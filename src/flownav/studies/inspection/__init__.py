@@ -1,1 +1,0 @@
-"""Inspection: what a log holds, and whether it can be trusted."""

@@ -9,7 +9,7 @@ from flownav.core.frames import GRAVITY_M_S2, Quaternion, Rotation, quaternion_f
 from flownav.core.measurement import Sensor
 from flownav.estimation.covariance import begin_lane, lagged, set_covariance, set_variance, states_of
 from flownav.estimation.hypotheses import COUNT, begin_lane_anew
-from flownav.estimation.laws.geometry import component
+from flownav.estimation.laws import component
 from flownav.estimation.named import Attitude, PositionNed, rotation_by
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, POSITION, RATE, VELOCITY
 from flownav.navigation.course import with_sought
@@ -38,11 +38,9 @@ COMPASS_HEADING_RAD = 0.3  # a raw magnetometer's: twice the usual hard iron (co
 DATUM_HEADING_RAD = 1e-3  # the start defines the frame
 UNTOLD_HEADING_RAD = 1.0  # the first heading that is told will, 0.5 rad off (test_an_external_heading_is_taken)
 LEAST_LEVELLING, MOST_LEVELLING = 5.0, 100.0  # readings whose mean is level: 0.1 to 2 s at 50 Hz
-LEVELLED_M_S2, LEVELLING_S = (
-    0.1,
-    1.0,
-)  # so sure a mean will do (0.6 deg); of a shaken vehicle's a second's is waited for
-HOVERING_M_S2 = 0.15  # how a vehicle may accelerate over that second: chosen; with 0.1 laps from the start err 2.6 sigma
+# so sure a mean will do (0.6 deg); a shaken vehicle's is waited for
+LEVELLED_M_S2, LEVELLING_S = 0.1, 1.0
+HOVERING_M_S2 = 0.15  # how it may accelerate over that second: chosen; with 0.1 laps from the start err 2.6 sigma
 RECTIFIED_SHARE = 0.1  # of what shakes an accelerometer lasts in its mean: chosen; 1 is the false roll of `landing`
 
 with_force = replacing(StartMemory, "force_x", "force_y", "force_z", "readings", "shaken", "since_s")

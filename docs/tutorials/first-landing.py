@@ -14,7 +14,7 @@
 #
 # One command flies a helicopter from a hover at 3 m down to a pad. The helicopter carries an IMU, a magnetometer, a
 # barometer, a GPS receiver, an optical-flow camera and a rangefinder, and its autopilot knows only what the
-# navigator makes of them. The very first flight compiles the simulator, which takes a minute or two; after that a
+# navigator makes of them. The very first flight compiles the simulator, which takes about half a minute; after that a
 # flight takes less than a second.
 
 # %% language="bash"

@@ -32,7 +32,7 @@ Progress = Callable[[int], object]
 
 
 def fly(
-    scenario: str | Path | Scenario = "landing",
+    scenario: str | Path | Scenario = "sortie",
     *,
     seed: int = 1,
     flight: int | Mapping[str, Any] = 0,
@@ -46,14 +46,13 @@ def fly(
 ) -> Record:
     """Fly a scenario once, in closed loop, and score the flight.
 
-    scenario: takeoff, landing, gusty, pad_return, approach, a TOML file or a Scenario. seed, flight: flight k of a
-    seed is always the same flight, to the bit. filter: "landing" (the navigator, by default), "paper", or a filter of
-    your own: its class, an object, an entry point's name or "file.py:Class" (docs: own parts); likewise sensors, each
-    in place of ours of its kind, and controller. vehicle: a shipped one's name, a file, a Vehicle or a vehicle of your
-    own. dispersed: vehicle, wind and sensors are drawn for this flight, and
+    scenario: sortie (the whole mission, by default), takeoff, landing, gusty, pad_return, approach, a TOML file or a
+    Scenario. seed, flight: flight k of a seed is always the same flight, to the bit. filter: "landing" (the navigator,
+    by default), "paper", or a filter of your own: its class, an object, an entry point's name or "file.py:Class" (docs:
+    own parts); likewise sensors, each in place of ours of its kind, and controller. vehicle: a shipped one's name, a
+    file, a Vehicle or a vehicle of your own. dispersed: vehicle, wind and sensors are drawn for this flight, and
     neither navigator nor autopilot knows how; else they are what is believed. progress: called with 1 when it is down.
-    changes: other values for the scenario's own keys, as `Scenario.changed` takes them
-    (docs/reference/scenarios.md).
+    changes: other values for the scenario's own keys, as `Scenario.changed` takes them (docs/reference/scenarios.md).
     InputError, one line, for a name, a key or a value that cannot be. What a flight crashes on is in `record.verdict`.
 
     Example:

@@ -239,8 +239,8 @@ def headline_of(record: Record) -> str:
         largest = scores.get("max_position_error_m")
         return (f"largest error of one axis {largest:.3f} m" if largest is not None else "scored in part") + thin
     if touchdown:
-        end = touchdown.get("rest") or touchdown.get("contact") or {}
-        away = end.get("distance_m")
+        ends = (touchdown.get(name) or {} for name in ("rest", "contact"))
+        away = next((end["distance_m"] for end in ends if end.get("distance_m") is not None), None)
         return f"{touchdown['verdict']}" + (f", {away:.3f} m from the pad's centre" if away is not None else "")
     if scores.get("max_position_error_m") is not None:
         return f"largest error of one axis {scores['max_position_error_m']:.3f} m"

@@ -149,6 +149,8 @@ class Record(ground.Record):
         if bad:
             return str(bad[0])
         landing = self.scores.get("touchdown") or {}
+        if landing.get("reason"):
+            return f"{landing['verdict']}: {landing['reason']}"
         return (
             f"crashed: {', '.join(landing['broken'])}" if self.scores.get("crashed") and landing.get("broken") else ""
         )

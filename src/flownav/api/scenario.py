@@ -9,6 +9,7 @@ from typing import Any
 from flownav.api.calls import merged, plain_entries, saved
 from flownav.api.sensor import Sensor
 from flownav.api.vehicle import Vehicle
+from flownav.core.errors import InputError, arg
 from flownav.core.parameter_files import check
 from flownav.simulation.dispersion import SHIPPED as SHIPPED_DISPERSION
 from flownav.simulation.scenario import Scenario as File
@@ -80,7 +81,8 @@ class Scenario:
         """Another scenario with other values: nested mappings are merged into the scenario's own tables.
 
         changes: the keys of a scenario file. One word stands for a table where it is plain what it means: `gps="midg"`,
-        `filter="paper"`, `autopilot="truth"`, `vehicle="quad-450"`. `vehicle` takes a Vehicle too, and `flow_sensor` a
+        `filter="paper"`, `autopilot="truth"`, `vehicle="quad-450"`, `wind=8` or `wind="8:270"` (m/s at 20 ft, from the
+        west). `vehicle` takes a Vehicle too, and `flow_sensor` a
         Sensor or a path. What is None is left as it is. A dotted name reaches inside: `{"flight.duration_s": 20.0}`.
         InputError, one line, for an unknown key and for a value out of its range.
 
@@ -137,9 +139,21 @@ def _given(name: str, value: Any) -> Any:
         return {"file": str(value.file_path())}
     if name == "flow_sensor" and isinstance(value, Sensor):
         return str(value.file_path())
+    if name == "wind" and isinstance(value, (int, float, str)) and not isinstance(value, bool):
+        return wind_of(str(value))
     if isinstance(value, Path):
         value = str(value)
     return {WORDS[name]: value} if name in WORDS and isinstance(value, str) else value
+
+
+def wind_of(text: str) -> dict[str, float]:
+    """The wind that "8" or "8:270" says: speed at 20 ft [m/s], and where it blows from [deg]. InputError otherwise."""
+    speed, _, direction = text.partition(":")
+    try:
+        given = {"speed_20ft_m_s": float(speed)}
+        return given | ({"from_direction_deg": float(direction)} if direction else {})
+    except ValueError:
+        raise InputError(f"{arg('wind')} {text}: m/s at 20 ft, and degrees where it blows from: 8, or 8:270") from None
 
 
 def _with_whole_paths(entries: dict[str, Any]) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from flownav.scoring.landings import (
     success,
     takeoff_of_flight,
     takeoffs,
+    with_reason,
 )
 from flownav.scoring.touchdown import Limits, motion_of, touchdowns
 from flownav.simulation.assemble import Setup, assemble
@@ -163,10 +164,13 @@ def record_flown(setup: Setup, flown: Flown, seed: int, index: int, drawn: dict[
     if drawn is not None:
         record.manifest["parameters"] = {**record.manifest["parameters"], "drawn": drawn}
     up = takeoff_history(setup.flight, flown.history)
-    record.manifest["scores"] = errors.scores_of_flight(score_history(setup.flight, flown.history)[0])
+    table, facts = judging_table(setup.flight, flown.history), judging_facts(setup.flight)
+    above_m = -flown.history[-1, column("truth", "pos_d_m"), 0] - table["ground_m"][-1]
+    scores = errors.scores_of_flight(score_history(setup.flight, flown.history)[0])
+    record.manifest["scores"] = with_reason(scores, float(above_m) - facts["cg_above_skid_m"], facts)
     record.manifest["scores"]["takeoff"] = None if up is None else takeoff_of_flight(up[0])
-    record.add("judging", judging_table(setup.flight, flown.history))
-    record.manifest["judging"] = judging_facts(setup.flight)
+    record.add("judging", table)
+    record.manifest["judging"] = facts
     record.manifest["paper"] = errors.published(setup.scenario.paper_table)
     if setup.fitted is not None:
         record.manifest["known_exactly"] = known_exactly(setup.scenario)
@@ -194,6 +198,8 @@ def judging_facts(flight: Flight) -> dict[str, Any]:
         "cg_above_skid_m": float(flight.vehicle.cg_above_skid_m),
         "may_land_after_s": float(plan.may_land_after_s),
         "handover_s": float(plan.handover_s),
+        "align_height_m": float(flight.gains.align_height_m),
+        "search_height_m": float(flight.gains.search_height_m),
         "starts_on_ground": bool(plan.starts_on_ground),
         "flown_on_truth": bool(plan.fly_on_truth),
         "limits": {name: float(value) for name, value in flight.limits._asdict().items()},

@@ -19,6 +19,7 @@ CRASHES_ALLOWED = 0.05  # of the flights, before the exit status says that the v
 
 GPS = "GPS errors: white noise as in the paper, or a receiver of 2 m CEP."
 ON = "What the autopilot flies on."
+WIND = "Wind at 20 ft in m/s, with gusts, and where it blows from in degrees: 8:270."
 PLANT = "The plant; linear is the paper's model."
 CAMERA = "The pad camera; pixels renders its frames, which takes minutes a flight."
 ONE_OR_MANY = "one flight matched, many an ensemble"
@@ -27,11 +28,12 @@ FAST = "How fast it is sent: 1 is real time."
 
 
 def command(
-    scenario: options.Scenario,
+    scenario: options.Scenario = "sortie",
     flights: Annotated[int, option("N", "How many flights; more than one gives medians and 5-95 %.")] = 1,
     flight: Annotated[int | None, option("K", "Fly only flight K of the seed, counted from 0.", unset="0")] = None,
     seed: options.Seed = 1,
     gps: Annotated[str | None, chosen(GPS, *options.GPS_MODELS, unset=options.SCENARIOS_OWN)] = None,
+    wind: Annotated[str | None, option("SPEED[:FROM]", WIND, unset=options.SCENARIOS_OWN)] = None,
     filter_name: options.Filter = None,
     feedback: Annotated[str | None, chosen(ON, *options.FEEDBACKS, unset=options.SCENARIOS_OWN)] = None,
     truth: Annotated[str | None, chosen(PLANT, *options.PLANTS, unset=options.SCENARIOS_OWN)] = None,
@@ -60,7 +62,14 @@ def command(
     parts, ours, _ = split(filter_name, (), None, None)
     flow = str(sensor) if sensor else None
     chosen = Scenario.load(scenario).changed(
-        gps=gps, filter=ours, autopilot=feedback, truth=truth, optics=optics, flow_sensor=flow, vehicle=vehicle
+        gps=gps,
+        wind=wind,
+        filter=ours,
+        autopilot=feedback,
+        truth=truth,
+        optics=optics,
+        flow_sensor=flow,
+        vehicle=vehicle,
     )
     setup = assemble(chosen.file)
     asked = out or Path("out") / f"{chosen.name}.fnr"
@@ -78,12 +87,18 @@ def command(
 
 
 def _say(facts: dict[str, Any], flown: Flights, flights: int, as_json: bool) -> None:
-    """The figures of the flights. VerdictError where too many crashed."""
+    """The figures of the flights. VerdictError where too many crashed or never landed."""
     answer(facts, as_json, lambda: show(facts, flown.record.manifest["paper"], flown.index))
     if int(facts["crashed"]) > CRASHES_ALLOWED * flights:
         raise VerdictError(
             f"{int(facts['crashed'])} of {flights} flights crashed (see `crashed` in docs/reference/scenarios.md)"
         )
+    landing = facts["touchdown"] or {}
+    if "reason" in landing:
+        raise VerdictError(f"{landing['verdict']}: {landing['reason']}")
+    never = landing.get("unfinished", {}).get("never touched", 0)
+    if never > CRASHES_ALLOWED * flights:
+        raise VerdictError(f"{never} of {flights} flights never landed")
 
 
 WIDE = 92  # columns that one flight beside a published table takes
@@ -182,7 +197,8 @@ def _verdict_lines(landing: dict[str, Any]) -> list[str]:
     broken = landing["broken"]
     verdict = f"crashed: {', '.join(broken)}" if broken else landing["verdict"].replace("unfinished", "not at rest")
     around = f", after {landing['go_arounds']} go-around(s)" if landing["go_arounds"] else ""
-    return [f"verdict  {verdict}{around}"]
+    why = f": {landing['reason']}" if "reason" in landing else ""
+    return [f"verdict  {verdict}{around}{why}"]
 
 
 def _landed_lines(landing: dict[str, Any], landed: int, flights: int) -> list[str]:

@@ -17,7 +17,7 @@ from flownav.core.errors import InputError
 from flownav.core.text import number
 
 Range = tuple[float, float]
-SCENARIOS = ("takeoff", "landing", "gusty", "pad_return", "approach")
+SCENARIOS = ("sortie", "takeoff", "landing", "gusty", "pad_return", "approach")
 REQUIREMENTS = ("takeoff", "landing", "pad_return", "approach", "approach_8_m_s")
 VEHICLES = ("maxi-joker-3", "quad-450", "hexa-550")
 FILTERS = ("landing", "paper")

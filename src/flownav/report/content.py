@@ -171,7 +171,7 @@ def landing_sentences(landing: Mapping[str, Any]) -> list[str]:
     """Sentences on `scores.touchdown` as one flight has it; empty where it touched nothing."""
     contact, rest, limited = (mapping(landing.get(name)) for name in ("contact", "rest", "limited_by"))
     said = []
-    if contact:
+    if contact.get("distance_m") is not None:
         said.append(
             f"It touched down after {number(contact.get('t_s'), 1)} s, {metres(contact.get('distance_m'))} m from the "
             f"pad's centre, sinking at {number(contact.get('sink_rate_m_s'), 2)} m/s and drifting at "
@@ -182,13 +182,15 @@ def landing_sentences(landing: Mapping[str, Any]) -> list[str]:
             f"Of that its estimate was off by {metres(limited.get('estimate_m'))} m, its guidance by "
             f"{metres(limited.get('guidance_m'))} m and the pad's place by {metres(limited.get('pad_m'))} m."
         )
-    if rest:
+    if rest.get("distance_m") is not None:
         said.append(
             f"It came to rest {metres(rest.get('distance_m'))} m from the centre, {metres(rest.get('slide_m'))} m from "
             "where it touched."
         )
     if landing.get("broken"):
         said.append(f"It crashed: {', '.join(landing['broken'])}.")
+    if landing.get("reason"):
+        said.append(f"It never landed: {landing['reason']}.")
     return said
 
 
@@ -204,13 +206,15 @@ def landing_tiles(landing: Mapping[str, Any]) -> list[Tile]:
     """The landing as headline figures."""
     contact, rest, limited = (mapping(landing.get(name)) for name in ("contact", "rest", "limited_by"))
     found = []
-    if contact:
+    if contact.get("distance_m") is not None:
         when = f"at {number(contact.get('t_s'), 1)} s"
         found.append(Tile("Touchdown off centre", metres(contact.get("distance_m")), "m", when, parts_of(limited)))
         found.append(Tile("Touchdown sink rate", number(contact.get("sink_rate_m_s"), 2), "m/s", when))
-    if rest:
+    if rest.get("distance_m") is not None:
         slid = f"slid {metres(rest.get('slide_m'))} m"
         found.append(Tile("At rest off centre", metres(rest.get("distance_m")), "m", slid))
     if landing.get("broken"):
         found.append(Tile("Crashed", "yes", "", ", ".join(landing["broken"])))
+    if landing.get("reason"):
+        found.append(Tile("Landed", "never", "", landing["reason"]))
     return found

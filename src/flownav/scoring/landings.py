@@ -11,6 +11,7 @@ It says what this flight would show again under the same conditions, not what ot
 """
 
 from collections import Counter
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -99,6 +100,8 @@ def mean_difference(t_s: Array, first: Array, second: Array, confidence: float =
 
 
 R_SHARE = 0.95
+NEVER_LANDED = "never landed"  # the verdict of one flight that was to land and never touched
+AT_GATE_M = 0.35  # so near a gate's height a vehicle waits there: a search stays up to 0.3 m above its own
 CONFIDENCE = 0.95
 EXPECTED, BROKEN, GO_AROUNDS, ALOFT = (
     TOUCHDOWN_COLUMNS.index(name) for name in ("expected", "broken", "go_arounds", "aloft")
@@ -124,16 +127,37 @@ def succeeded(rows: Array) -> NDArray[np.bool_]:
 
 
 def touchdown_of_flight(row: Array) -> dict[str, Any] | None:
-    """The values of one flight; None where it touched nothing, broke nothing and did not go around."""
-    broken = names_of(row[BROKEN])
-    if not np.isfinite(row[CONTACT_DISTANCE]) and not broken and not row[ALOFT]:
+    """The values of one flight; None where it was not to land, touched nothing, broke nothing and did not go around.
+
+    What was to happen and did not is a group of nulls.
+    """
+    broken, touched = names_of(row[BROKEN]), bool(np.isfinite(row[CONTACT_DISTANCE]))
+    if not row[EXPECTED] and not touched and not broken and not row[ALOFT]:
         return None
-    said: dict[str, Any] = {}
-    for group, names in (("contact", CONTACT), ("rest", REST), ("limited_by", LIMITED_BY)):
-        figures = {name: finite_or_none(row[column_of(group, name)]) for name in names}
-        said[group] = None if all(figure is None for figure in figures.values()) else figures
-    landed, times = bool(succeeded(row[None, :])[0]), int(row[GO_AROUNDS])
-    return said | {"success": landed, "broken": broken, "go_arounds": times, "verdict": verdict_of(row)}
+    said: dict[str, Any] = {
+        group: {name: finite_or_none(row[column_of(group, name)]) for name in names}
+        for group, names in (("contact", CONTACT), ("rest", REST), ("limited_by", LIMITED_BY))
+    }
+    said["limited_by"] = said["limited_by"] if touched else None
+    landed, times, verdict = bool(succeeded(row[None, :])[0]), int(row[GO_AROUNDS]), verdict_of(row)
+    verdict = NEVER_LANDED if verdict == "unfinished" and not touched else verdict
+    return said | {"success": landed, "broken": broken, "go_arounds": times, "verdict": verdict}
+
+
+def with_reason(scores: dict[str, Any], height_m: float, facts: Mapping[str, Any]) -> dict[str, Any]:
+    """A flight's scores in which a landing that never came has its reason.
+
+    height_m: of the skids over the ground at the end; facts: what the flight's judging says of its gates.
+    """
+    landing = scores["touchdown"]
+    if landing is None or landing["verdict"] != NEVER_LANDED:
+        return scores
+    where = f"{height_m:.2f} m over the ground when the flight ends"
+    for name, words in (("search_height_m", "looks for its pad from"), ("align_height_m", "waits at the gate of")):
+        gate_m = float(facts.get(name, 0.0))
+        if gate_m > 0.0 and abs(height_m - gate_m) < AT_GATE_M:
+            where = f"{words} {gate_m:g} m, {where}"
+    return scores | {"touchdown": landing | {"reason": where}}
 
 
 def touchdown_of_flights(rows: Array) -> dict[str, Any] | None:

@@ -12,7 +12,7 @@ from flownav.core.measurement import COLUMNS, Array, Sensor
 from flownav.core.record import POSITION_NED, PROTECTION_LEVELS, QUATERNION, VELOCITY_BODY, Column, Record
 from flownav.scoring.consistency import consistency_by_sensor
 from flownav.scoring.errors import MAX_POSITION_ERROR, STATES, STATISTICS, score_block, scores_of_flight
-from flownav.scoring.landings import takeoff_of_flight, takeoffs
+from flownav.scoring.landings import takeoff_of_flight, takeoffs, with_reason
 from flownav.scoring.path import References, columns_of, end_drift_of, motion_of, path_scores, truth_motion
 from flownav.scoring.phases import Phase, phase_at
 from flownav.scoring.reference import drift_of, protection_of
@@ -87,7 +87,8 @@ def flight_scores(record: Record, estimate: Estimate) -> dict[str, Any]:
         float(facts["may_land_after_s"]),
     )  # fmt: skip
     row = score_block(said[:, :, None], true[:, :, None], touched, counted[:, None])[0]
-    return scores_of_flight(_known(row)) | {"takeoff": _takeoff(record, facts)}
+    end_m = float(over_ground.cg_height_m[-1, 0]) - float(facts["cg_above_skid_m"])
+    return with_reason(scores_of_flight(_known(row)), end_m, facts) | {"takeoff": _takeoff(record, facts)}
 
 
 def _known(row: Array) -> Array:

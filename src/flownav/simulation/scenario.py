@@ -1,7 +1,7 @@
 """Scenario files: what is flown, with which vehicle, sensors, wind, filter and autopilot.
 
-`takeoff`, `landing`, `gusty`, `pad_return` and `approach` ship; any TOML file of this schema flies. Positions are
-those of the skids relative to the pad's centre, in the local NED frame.
+`sortie`, `takeoff`, `landing`, `gusty`, `pad_return` and `approach` ship; any TOML file of this schema flies. Positions
+are those of the skids relative to the pad's centre, in the local NED frame.
 """
 
 from itertools import pairwise
@@ -20,7 +20,7 @@ from flownav.simulation.ground import GroundSettings, RecirculationSettings
 from flownav.simulation.wind import WindSettings
 from flownav.vehicle.kinds import SHIPPED_NAMES
 
-SHIPPED = ("takeoff", "landing", "gusty", "pad_return", "approach", "sortie")
+SHIPPED = ("sortie", "takeoff", "landing", "gusty", "pad_return", "approach")
 
 
 class Knot(ParameterModel):

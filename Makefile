@@ -1,4 +1,4 @@
-# flownav: `make demo` flies the paper's landing on the landing filter, `make test` proves the package. Either works first.
+# flownav: `make demo` flies the whole mission, from the pad and back onto it, `make test` proves the package. Either works first.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -7,7 +7,7 @@ INSTALL := $(BIN)/python -m pip install --quiet --no-compile --disable-pip-versi
 .PHONY: demo test test-real-time test-random test-gpu test-slow long-log fuzz mutants league integrity rare validate weigh digests pairs report-size schemas lint bench bench-once docs pictures tutorials wheel wheel-test clean
 
 demo: $(VENV)/.ready
-	$(BIN)/flownav fly landing --out out/landing.fnr --force
+	$(BIN)/flownav fly --out out/sortie.fnr --force
 
 test: $(VENV)/.ready-test
 	PYTHONHASHSEED=0 $(BIN)/python -m pytest -m "not slow and not real_time" -n 2 --dist loadfile --no-loadscope-reorder -p no:benchmark

@@ -12,11 +12,11 @@
 #
 # ## Fly
 #
-# One command flies a helicopter from its pad and back: it stands, takes off, hovers for 20 s, flies a circuit of 30 m,
-# finds the pad again and lands on it, in gusts, with a GPS that is 2 m off. It carries an IMU, a magnetometer, a
+# One command flies a helicopter from its pad and back: it stands, takes off, hovers for 20 s, flies a circuit of 30
+# m, finds the pad again and lands on it, in gusts, with a GPS that is 2 m off. It carries an IMU, a magnetometer, a
 # barometer, a GPS receiver, an optical-flow camera, a rangefinder and a camera that knows the pad, and its autopilot
-# knows only what the navigator makes of them. The very first flight compiles the simulator, which takes about half a minute; after that a
-# flight takes less than a second.
+# knows only what the navigator makes of them. The very first flight compiles the simulator, which takes about half a
+# minute; after that a flight takes less than a second.
 
 # %% language="bash"
 # flownav fly --seed 1 --out sortie.fnr

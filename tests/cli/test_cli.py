@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import flownav
 from command import run
 from flownav.cli import app
 from flownav.core.parameter_files import shipped
@@ -70,6 +71,39 @@ def test_fly_json_has_every_key_and_its_record_is_there(tmp_path):
     error = (record.matrix("flown", ("pos_n_m",)) - record.matrix("truth", ("pos_n_m",)))[handed]
     assert facts["states"]["x"]["rms_error"] == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-12)
     assert (tmp_path / "f.html").stat().st_size > 1e5
+
+
+BLIND = """schema_version = 1
+name = "blind"
+[flight]
+duration_s = 14.0
+start = "hover"
+may_land_after_s = 6.0
+path = [{ t_s = 0.0, height_m = 2.0 }, { t_s = 6.0, height_m = 2.0 }, { t_s = 24.0, height_m = -3.4 }]
+[autopilot.precision]
+search_height_m = 1.0
+"""
+
+
+def test_a_flight_that_never_finds_its_pad_is_a_verdict_with_its_reason_and_exit_status_1(tmp_path):
+    (tmp_path / "blind.toml").write_text(BLIND, encoding="utf-8")
+    done = run("fly", "blind.toml", "--no-report", "--json", cwd=tmp_path)
+    assert done.returncode == 1
+    reason = json.loads(done.stdout)["touchdown"]["reason"]
+    assert reason.startswith("looks for its pad from 1 m, ")
+    assert done.stderr.splitlines()[-1] == f"flownav: never landed: {reason}"
+    shown = run("fly", "blind.toml", "--no-report", "--force", cwd=tmp_path)
+    assert f"verdict  never landed: {reason}"[:40] in shown.stdout
+    assert flownav.load(tmp_path / "out" / "blind.fnr").verdict == f"never landed: {reason}"
+
+
+def test_a_scenario_is_flown_in_the_wind_that_is_asked_for(tmp_path):
+    done = run("fly", short(tmp_path), "--wind", "8:270", "--json", "--no-report", "--out", "w.fnr", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    wind = Record.load(tmp_path / "w.fnr").manifest["parameters"]["scenario"]["wind"]
+    assert (wind["speed_20ft_m_s"], wind["from_direction_deg"], wind["gusts"]) == (8.0, 270.0, True)
+    assert flownav.Scenario.load("landing").changed(wind=8).file.wind.speed_20ft_m_s == 8.0
+    assert flownav.Scenario.load("landing").changed(wind="3:-90.5").file.wind.from_direction_deg == -90.5
 
 
 def test_a_flight_that_ends_before_the_hand_over_has_null_errors_and_a_table(tmp_path):

@@ -51,5 +51,5 @@ def test_files_are_offered_beside_the_names(tmp_path):
     (tmp_path / "notes.txt").touch()
     (tmp_path / "sub").mkdir()
     found = completed("flownav fly ", tmp_path)
-    assert found[:5] == ["takeoff", "landing", "gusty", "pad_return", "approach"]
-    assert set(found[5:]) == {"windy.toml", "sub/"}
+    assert found[:6] == ["sortie", "takeoff", "landing", "gusty", "pad_return", "approach"]
+    assert set(found[6:]) == {"windy.toml", "sub/"}

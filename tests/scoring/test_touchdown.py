@@ -14,6 +14,7 @@ from flownav.scoring.landings import (
     touchdown_of_flight,
     touchdown_of_flights,
     verdict_of,
+    with_reason,
 )
 from flownav.scoring.touchdown import (
     TOUCHDOWN_COLUMNS,
@@ -114,8 +115,8 @@ def test_the_place_is_that_of_the_skids_under_a_tilted_vehicle():
     assert motion.lateral_m_s[0, 0] == pytest.approx(np.hypot(0.6, 0.8 * np.cos(2.0 * half)))
 
 
-def test_a_flight_that_never_touches_has_none():
-    assert flight(landing(on_ground=np.zeros((EPOCHS, 1)))) is None
+def test_a_flight_that_was_not_to_land_and_never_touches_has_none():
+    assert flight(landing(on_ground=np.zeros((EPOCHS, 1))), may_land_after_s=1e9) is None
     many = touchdown_of_flights(row_of(landing(on_ground=np.zeros((EPOCHS, 1))), may_land_after_s=1e9)[None, :])
     assert many is None
 
@@ -249,6 +250,23 @@ def test_success_has_clopper_and_pearsons_interval():
     low, high = stats.beta.ppf(0.025, 38, 3), stats.beta.ppf(0.975, 39, 2)
     assert (found["rate"], found["low"], found["high"]) == pytest.approx((0.95, low, high))
     assert success(rows(np.ones(10)))["high"] == 1.0
+
+
+@pytest.mark.parametrize(("height_m", "reason"), [
+    (0.42, "waits at the gate of 0.3 m, 0.42 m over the ground when the flight ends"),
+    (2.6, "looks for its pad from 2.5 m, 2.60 m over the ground when the flight ends"),
+    (1.1, "1.10 m over the ground when the flight ends"),
+])  # fmt: skip
+def test_a_flight_that_was_to_land_and_never_touched_says_so_and_why(height_m, reason):
+    never = row_of(landing(on_ground=np.zeros((EPOCHS, 1))))
+    scores = with_reason(
+        {"touchdown": touchdown_of_flight(never)}, height_m, {"align_height_m": 0.3, "search_height_m": 2.5}
+    )
+    said = scores["touchdown"]
+    assert (said["verdict"], said["reason"]) == ("never landed", reason)
+    assert (said["contact"]["distance_m"], said["rest"]["distance_m"], said["limited_by"]) == (None, None, None)
+    landed = {"touchdown": touchdown_of_flight(row_of(landing()))}
+    assert with_reason(landed, height_m, {}) == landed
 
 
 def test_flights_that_were_to_land_and_did_not_are_failures_and_not_unsaid():

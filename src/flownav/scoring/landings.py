@@ -129,7 +129,7 @@ def succeeded(rows: Array) -> NDArray[np.bool_]:
 def touchdown_of_flight(row: Array) -> dict[str, Any] | None:
     """The values of one flight; None where it was not to land, touched nothing, broke nothing and did not go around.
 
-    What was to happen and did not is a group of nulls.
+    Of a flight that never landed contact and rest are groups of nulls; else what did not happen is null.
     """
     broken, touched = names_of(row[BROKEN]), bool(np.isfinite(row[CONTACT_DISTANCE]))
     if not row[EXPECTED] and not touched and not broken and not row[ALOFT]:
@@ -138,9 +138,11 @@ def touchdown_of_flight(row: Array) -> dict[str, Any] | None:
         group: {name: finite_or_none(row[column_of(group, name)]) for name in names}
         for group, names in (("contact", CONTACT), ("rest", REST), ("limited_by", LIMITED_BY))
     }
-    said["limited_by"] = said["limited_by"] if touched else None
     landed, times, verdict = bool(succeeded(row[None, :])[0]), int(row[GO_AROUNDS]), verdict_of(row)
     verdict = NEVER_LANDED if verdict == "unfinished" and not touched else verdict
+    for group, figures in said.items():
+        nothing = all(figure is None for figure in figures.values())
+        said[group] = None if nothing and (verdict != NEVER_LANDED or group == "limited_by") else figures
     return said | {"success": landed, "broken": broken, "go_arounds": times, "verdict": verdict}
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from command import printed
 from flownav.campaigns.local import rows_of
 from flownav.campaigns.measures import event_of, measured
 from flownav.campaigns.plan import changed
@@ -253,7 +254,7 @@ def run(*arguments):
 def test_mistakes_of_the_command_are_said(tmp_path, arguments, said):
     result = run(*arguments, "--out", str(tmp_path / "out"))
     assert result.exit_code != 0
-    assert said in f"{result.output}{result.exception}"
+    assert said in f"{result.output}{printed(result.exception)}"
 
 
 def test_the_command_writes_the_flight_and_flies_it_again(tmp_path, fewer):

@@ -214,7 +214,8 @@ def test_choices_replace_the_files_own(tmp_path, choice):
     [
         (
             ("fly", "nowhere"),
-            "nowhere: no such scenario; shipped: sortie, takeoff, landing, gusty, pad_return, approach, or give a TOML file",
+            "nowhere: no such scenario; shipped: sortie, takeoff, landing, gusty, pad_return, approach, or give a "
+            "TOML file",
         ),
         (("fly", "nowhere.toml"), "nowhere.toml: no such file"),
         (("fly", "landing", "--flights", "0"), "--flights 0: must be from 1 to"),

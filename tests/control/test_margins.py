@@ -53,6 +53,16 @@ def test_margins_are_those_of_python_control(loop):
     assert found.delay_s == pytest.approx(np.min(np.radians(np.mod(every_phase, 360.0)) / at_phase), rel=1e-3)
 
 
+def test_a_loop_that_lead_brings_to_its_edge_sooner_than_lag_counts_the_lead():
+    """Its phase is pi - a at |L| = 1, so that a of lead, and 2 pi - a of lag, are the edge."""
+    omega = np.geomspace(0.1, 10.0, 2001)
+    for lead_rad in (0.3, 1.0):
+        loop = -omega * np.exp(-1j * lead_rad)
+        found = margins(loop.astype(complex), omega)
+        assert found.phase_deg == pytest.approx(np.degrees(lead_rad), rel=1e-3)
+        assert found.delay_s == pytest.approx(2.0 * np.pi - lead_rad, rel=1e-3)
+
+
 def test_a_loop_that_never_reaches_one_has_no_phase_or_delay_to_lose():
     w = np.geomspace(0.01, 100.0, 500)
     found = margins(0.5 / (1.0 + 1j * w), w)

@@ -158,11 +158,13 @@ def test_against_the_continuous_motion_the_transition_is_of_second_order(seed):
 def test_the_covariance_is_f_p_f_transposed_plus_the_noise_of_motion(n):
     filter_ = filter_at(5, 0.3, -0.1, 2.0, 3.0)
     filter_.p = random_covariance(np.random.default_rng(1))
+    level = filter_.work[ACCEL_NOISE]
+    down = filter_.work[ACCEL_NOISE + 1] = 9.0 * level
     f = transition_of(filter_, lambda run: advance(run, EPOCH_S))[:n, :n]
     expected = filter_.p
     noise = np.zeros(n)
     noise[POSITION : POSITION + 3] = SETTINGS.position_walk_m_rt_s**2 * EPOCH_S
-    noise[VELOCITY : VELOCITY + 3] = SETTINGS.accel_noise_m_s2_rt_hz**2 * EPOCH_S
+    noise[VELOCITY : VELOCITY + 3] = np.array([level, level, down]) * EPOCH_S
     noise[ATTITUDE : ATTITUDE + 3] = SETTINGS.gyro_noise_rad_s_rt_hz**2 * EPOCH_S
     expected[:n, :n] = f @ expected[:n, :n] @ f.T + np.diag(noise)
     advance(filter_, EPOCH_S, SETTINGS, n)

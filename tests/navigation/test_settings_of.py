@@ -14,7 +14,7 @@ from flownav.navigation.settings_of import noise_of, of_gps_receiver, of_inertia
 from flownav.navigation.told import NO_HEADING, NO_STATED_NOISE, Equipment
 from flownav.sensors.datasheet import load_sensor
 from flownav.sensors.magnetometer import MagneticField, MagnetometerSheet
-from flownav.sensors.sheets import GpsReceiverSheet, InertialSheet, Vibration, shipped_sheets
+from flownav.sensors.sheets import GpsReceiverSheet, InertialSheet, Tone, Vibration, shipped_sheets
 
 FITTED = Equipment(True, False, NO_HEADING, False, -math.inf)
 
@@ -105,6 +105,23 @@ def test_vibration_of_the_sheet_counts_as_noise_and_as_harmless():
     for key in ("accel_noise_m_s2_rt_hz", "gyro_noise_rad_s_rt_hz"):
         assert calm[key] < weakened[key] < shaken[key]
     assert shaken["vibration_free_m_s2"] > calm["vibration_free_m_s2"] == NavigatorSettingsFile().vibration_free_m_s2
+
+
+def test_vertical_vibration_is_told_apart_from_level_vibration():
+    sheet = InertialSheet.read()
+    calm = sheet.accelerometer.model_copy(update={"density_ug_rthz": 1e-6})
+    tone = Tone(level_m_s2=2.0, vertical_m_s2=0.5)
+    keys = of_inertial(sheet.model_copy(update={"vibration": Vibration(rotor=tone), "accelerometer": calm}))
+    assert keys["accel_noise_down_share"] == pytest.approx(0.25)
+    assert of_inertial(sheet.model_copy(update={"vibration": Vibration()}))["accel_noise_down_share"] == 1.0
+
+
+def test_a_receivers_error_is_stated_by_its_rms_over_days_and_places():
+    sheet = GpsReceiverSheet.read()
+    alike = sheet.model_copy(update={"position": sheet.position.model_copy(update={"spread": 0.0})})
+    assert of_gps_receiver(alike)["gps_slow_sigma_m"] == sheet.position.slow_sigma_m
+    ratio = of_gps_receiver(sheet)["gps_fast_sigma_down_m"] / sheet.position.fast_sigma_down_m
+    assert ratio == pytest.approx(math.exp(1.5 * sheet.position.spread**2))
 
 
 def test_a_receivers_sheet_says_what_changes_from_fix_to_fix():

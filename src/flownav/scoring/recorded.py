@@ -11,7 +11,7 @@ from flownav.core.errors import InputError
 from flownav.core.measurement import COLUMNS, Array, Sensor
 from flownav.core.record import POSITION_NED, PROTECTION_LEVELS, QUATERNION, VELOCITY_BODY, Column, Record
 from flownav.scoring.consistency import consistency_by_sensor
-from flownav.scoring.errors import MAX_POSITION_ERROR, STATES, STATISTICS, score_block, scores_of_flight
+from flownav.scoring.errors import MAX_POSITION_ERROR, STATISTICS, score_block, scores_of_flight
 from flownav.scoring.landings import takeoff_of_flight, takeoffs, with_reason
 from flownav.scoring.path import References, columns_of, end_drift_of, motion_of, path_scores, truth_motion
 from flownav.scoring.phases import Phase, phase_at
@@ -94,10 +94,6 @@ def flight_scores(record: Record, estimate: Estimate) -> dict[str, Any]:
 def _known(row: Array) -> Array:
     """A row of scores in which a state of no number has no largest error either."""
     found = row.copy()
-    for state in range(len(STATES)):
-        first = state * len(STATISTICS)
-        if np.isnan(row[first]):
-            found[first : first + len(STATISTICS)] = np.nan
     if np.isnan(found[: 3 * len(STATISTICS)]).any():
         found[MAX_POSITION_ERROR] = np.nan
     return found

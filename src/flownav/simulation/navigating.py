@@ -112,6 +112,9 @@ def note_truth(state: HelicopterState) -> records.TruthThen:
     )
 
 
+NOTHING_STATED = records.Spread(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # before the start: lanes start one by one
+
+
 class Compared(NamedTuple):
     """The navigator beside the truth."""
 
@@ -139,7 +142,7 @@ def compare_at_horizon(
             said[1] - was[1] if running else np.nan,
             said[2] - was[2] if running else np.nan,
         ),
-        records.Spread(*stated),
+        records.Spread(*stated) if start.started > 0.0 else NOTHING_STATED,
     )
 
 

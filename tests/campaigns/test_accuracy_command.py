@@ -160,7 +160,7 @@ def test_judged_flights_have_the_scores_of_plain_ones_and_no_lane_of_the_last_bl
     assert judged.sums.flights == GROUP_FLIGHTS + 5
     started = np.argmax(judged.sums.running == judged.sums.flights)
     in_all = epochs - flight.table.horizon_epochs
-    assert started < 50
+    assert started < 60  # a shaken vehicle levels itself for a second
     assert judged.sums.errors.steps.sum() == judged.sums.running.sum()
     assert [steps for _, steps in judged.groups] == [in_all - started]  # one whole group; the rest is left out
     few = fly_judged(flight, 3, 5)

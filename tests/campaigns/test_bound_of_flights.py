@@ -53,7 +53,8 @@ def vertical_channel(setup, steps):
     s = setup.fitted.told.settings
     dt, noise, none = IMU_S, gps_variance(setup), (np.zeros((0, 3)), np.zeros((0, 0)))
     transition = np.array([[1.0, dt, -0.5 * dt * dt], [0.0, 1.0, -dt], [0.0, 0.0, 1.0]])
-    walk, speed, bias = (x * x * dt for x in (s.position_walk_m_rt_s, s.accel_noise_m_s2_rt_hz, s.accel_walk_m_s2_rt_s))
+    vertical = s.accel_noise_m_s2_rt_hz * s.accel_noise_down_share
+    walk, speed, bias = (x * x * dt for x in (s.position_walk_m_rt_s, vertical, s.accel_walk_m_s2_rt_s))
     half = np.array([0.5 * dt, 1.0, 0.0])
     process = speed * np.outer(half, half) + np.diag([walk, 1e-16, bias])
     gps = (np.array([[1.0, 0.0, 0.0]]), np.array([[noise]]))

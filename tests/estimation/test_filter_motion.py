@@ -31,7 +31,7 @@ from filters import (
 from flownav.core.compile import ONE_LANE
 from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler
 from flownav.estimation.error_models import FilterSettings, propagate_walks
-from flownav.estimation.motion import hold_still, predict, turned
+from flownav.estimation.motion import add_motion_noise, hold_still, predict, turned
 from flownav.estimation.states import (
     ACCEL_BIAS,
     ACCEL_NOISE,
@@ -158,17 +158,23 @@ def test_against_the_continuous_motion_the_transition_is_of_second_order(seed):
 def test_the_covariance_is_f_p_f_transposed_plus_the_noise_of_motion(n):
     filter_ = filter_at(5, 0.3, -0.1, 2.0, 3.0)
     filter_.p = random_covariance(np.random.default_rng(1))
-    level = filter_.work[ACCEL_NOISE]
-    down = filter_.work[ACCEL_NOISE + 1] = 9.0 * level
     f = transition_of(filter_, lambda run: advance(run, EPOCH_S))[:n, :n]
     expected = filter_.p
     noise = np.zeros(n)
     noise[POSITION : POSITION + 3] = SETTINGS.position_walk_m_rt_s**2 * EPOCH_S
-    noise[VELOCITY : VELOCITY + 3] = np.array([level, level, down]) * EPOCH_S
+    noise[VELOCITY : VELOCITY + 3] = SETTINGS.accel_noise_m_s2_rt_hz**2 * EPOCH_S
     noise[ATTITUDE : ATTITUDE + 3] = SETTINGS.gyro_noise_rad_s_rt_hz**2 * EPOCH_S
     expected[:n, :n] = f @ expected[:n, :n] @ f.T + np.diag(noise)
     advance(filter_, EPOCH_S, SETTINGS, n)
     assert np.allclose(filter_.p, expected, rtol=1e-7, atol=1e-9)
+
+
+def test_white_noise_of_the_force_is_level_and_down():
+    filter_ = filter_at(5, 0.3, -0.1, 2.0, 3.0)
+    filter_.p = np.zeros((N, N))
+    filter_.work[ACCEL_NOISE : ACCEL_NOISE + 2] = 0.4, 3.0
+    add_motion_noise(filter_.work, ONE_LANE, 0.5, 0.0)
+    assert np.diag(filter_.p)[VELOCITY : VELOCITY + 3] == pytest.approx([0.2, 0.2, 1.5])
 
 
 def test_process_noise_is_right_to_first_order_of_the_step():

@@ -113,7 +113,7 @@ def test_the_floor_of_the_sonar_and_nan_are_never_taken_in(rows):
 def test_duplicates_and_disorder_change_little(rows):
     assert rows["duplicates"].moved_m < 1e-6
     assert rows["duplicates"].wrongly_fused == 0
-    assert rows["out_of_order"].moved_m < 0.2
+    assert rows["out_of_order"].moved_m < 0.4
 
 
 def test_garbage_is_flagged_while_it_lasts():

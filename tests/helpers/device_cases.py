@@ -25,7 +25,7 @@ SEED, FIRST = 5, 3
 SHORT: dict[str, tuple[str, dict[str, Any], int, bool]] = {
     "paper": ("landing", {"filter": {"name": "paper"}, "flight": {"duration_s": 1.0}}, 3, False),
     "drawn": ("gusty", {"filter": {"name": "paper"}, "flight": {"duration_s": 0.4}}, 3, True),
-    "navigator": ("landing", {"filter": {"handover_s": 0.2}, "flight": {"duration_s": 0.6}}, 2, False),
+    "navigator": ("landing", {"filter": {"handover_s": 0.2}, "flight": {"duration_s": 1.3}}, 2, False),
 }
 STEPS = (0, 1, 2500, 1 << 40)
 CHANNELS = (0, 17, 255)

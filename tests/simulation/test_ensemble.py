@@ -232,7 +232,7 @@ def test_shipped_scenarios_disperse_the_vehicle_the_wind_and_every_sensor(name):
     sources = {entry.partition(".")[0] for entry in ensemble.entries}
     wanted = {"vehicle", "wind", "flow_camera", "flow_sensor", "inertial", "gps_receiver", "range_sensor"}
     assert wanted <= sources
-    assert ("pad_camera" in sources) == (name == "approach")
+    assert ("pad_camera" in sources) == (name in ("approach", "sortie"))
     truths = ensemble.truths(1, 0, 200)
     assert all(isinstance(truth, Truth) for truth in truths)
     assert len({truth.vehicle.mass_kg for truth in truths}) == 200

@@ -211,7 +211,7 @@ def test_a_whole_fix_ends_the_count_and_half_of_one_does_not():
 ])  # fmt: skip
 def test_the_place_of_take_off_is_the_pad_until_a_camera_sees_one(known, off_m, landed, after, moves, stands):
     pad = Pad(BESIDE.pos_n + off_m, BESIDE.pos_e, BESIDE.pos_d)
-    found = stand_on_pad.law(reading(landed), RUNS, BESIDE, pad, PadMemory(known))
+    found = stand_on_pad.law(reading(landed), RUNS, BESIDE, pad, PadMemory(known, aloft_s=1.0), t_s=6.0)
     assert (found.pad.known, found.stands) == (after, stands)
     assert placed(found.place) == ([(PAD, 1.0), (PAD + 1, 2.0), (PAD + 2, -3.0)] if moves else [])
 
@@ -298,3 +298,14 @@ def test_a_heading_is_sought_where_none_is_read_and_the_start_does_not_define_it
     assert begun().heading.sought == 0.0
     assert begun(STANDS._replace(attitude_s=4.0), fitted=lost).heading.sought == 0.0
     assert (begun().first.untold_scale, begun(fitted=lost).first.untold_scale) == (True, False)
+
+
+def test_a_vehicle_flies_when_it_is_said_to_for_five_seconds_and_a_bounce_is_no_flight():
+    pad, m = Pad(0.0, 0.0, 0.0), PadMemory()
+    for t_s, landed, known in ((1.0, 0.0, 0.0), (5.5, 0.0, 0.0), (5.7, 1.0, STOOD_ON)):
+        m = stand_on_pad.law(reading(landed), RUNS, BESIDE, pad, m, t_s=t_s).pad
+        assert m.known == known
+    m = PadMemory()
+    for t_s, landed, known in ((1.0, 0.0, 0.0), (6.0, 0.0, NEVER_STOOD), (7.0, 1.0, NEVER_STOOD)):
+        m = stand_on_pad.law(reading(landed), RUNS, BESIDE, pad, m, t_s=t_s).pad
+        assert m.known == known

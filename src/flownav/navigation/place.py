@@ -32,6 +32,7 @@ LEAST_PAD_DISTANCE_M = 0.05  # chosen: no camera on board is so near its pad; ha
 # pad (test_a_pad_first_seen_where_there_is_none_is_found_where_it_is; 13 of 480 approaches landed metres beside).
 MANY_STRAYS = 6.0
 ON_GROUND = 0.5  # between 0 and 1
+FLOWN_S = 5.0  # chosen: a skid switch that bounces, or a detector that has not made up its mind, is no flight
 STANDING_SIGMA_M = 0.005  # chosen, not measured: how skids settle
 CARRIED_M = 0.1  # chosen, not measured; 0.05 m stays and 0.15 m goes along (test_fates)
 # how the pad is known: not, of a vehicle that flies and stood on none; it stands on it before its flight, has left it,
@@ -39,7 +40,7 @@ CARRIED_M = 0.1  # chosen, not measured; 0.05 m stays and 0.15 m goes along (tes
 NEVER_STOOD, STOOD_ON, LEFT, SEEN = -1.0, 1.0, 2.0, 3.0
 
 with_landed = replacing(AidMemory, "landed")
-with_known = replacing(PadMemory, "known")
+with_known = replacing(PadMemory, "known", "aloft_s")
 
 
 class Pad(NamedTuple):
@@ -135,7 +136,7 @@ def find_pad(
     off_n, off_e, off_d = to_earth(rotation, ahead, side, depth + s.pad_below_m)
     north_m, east_m, down_m = position.pos_n + off_n, position.pos_e + off_e, position.pos_d + off_d
     return FoundPad(
-        with_known(m, known=SEEN if found else m.known),
+        with_known(m, known=SEEN if found else m.known, aloft_s=m.aloft_s),
         pad_at(north_m, east_m, down_m, found),
         Event(PAD_FOUND if found else -1, np.sqrt(north_m * north_m + east_m * east_m + down_m * down_m)),
     )
@@ -167,7 +168,7 @@ def count_refusals(fate: Fate, m: PadMemory, *, component: int) -> PadMemory:
     refusals = m.refusals + 1.0 if refused else (0.0 if whole else m.refusals)
     astray = refusals >= MANY_STRAYS
     return PadMemory(
-        LEFT if astray else m.known, 0.0 if astray else refusals, 1.0 if component == 0 and refused else 0.0
+        LEFT if astray else m.known, 0.0 if astray else refusals, 1.0 if component == 0 and refused else 0.0, m.aloft_s
     )
 
 
@@ -209,7 +210,9 @@ class Standing(NamedTuple):
 
 
 @on_lanes
-def stand_on_pad(reading: Reading, start: StartMemory, position: PositionNed, pad: Pad, m: PadMemory) -> Standing:
+def stand_on_pad(
+    reading: Reading, start: StartMemory, position: PositionNed, pad: Pad, m: PadMemory, *, t_s: float
+) -> Standing:
     """The place of take-off is the pad until a camera sees one: a state tied to the vehicle's own while it stands, so
     that what GPS later tells of the one it tells of the other, and the way back is known better than either. A
     vehicle that is carried about before its flight takes the pad along; one that has flown lands where it lands.
@@ -220,10 +223,12 @@ def stand_on_pad(reading: Reading, start: StartMemory, position: PositionNed, pa
     carried = m.known == STOOD_ON and off_n * off_n + off_e * off_e > CARRIED_M * CARRIED_M
     anew = landed and (m.known == 0.0 or carried)
     known = STOOD_ON if anew else m.known
-    leaves = sound and not landed
-    known = LEFT if leaves and known == STOOD_ON else (NEVER_STOOD if leaves and known == 0.0 else known)
+    flies = sound and not landed
+    aloft_s = np.inf if landed else (t_s if flies and t_s < m.aloft_s else m.aloft_s)
+    never = flies and known == 0.0 and t_s - aloft_s >= FLOWN_S
+    known = LEFT if flies and known == STOOD_ON else (NEVER_STOOD if never else known)
     return Standing(
-        with_known(m, known=known),
+        with_known(m, known=known, aloft_s=aloft_s),
         pad_at(position.pos_n, position.pos_e, position.pos_d, anew),
         landed and known == STOOD_ON,
     )
@@ -246,7 +251,7 @@ def take_landed(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: O
         velocity_itself(work, lanes, axis)
         conclude(work, lanes, t_s, sensor, axis, s.gate_sigma, o)
         note_aid(work, lanes, t_s, o)
-    if stand_on_pad(work, lanes, o):
+    if stand_on_pad(work, lanes, t_s, o):
         for axis in range(3):
             tie_to_pad(work, lanes)
             pad_below(work, lanes, axis)

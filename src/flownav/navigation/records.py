@@ -194,13 +194,15 @@ class GpsMemory(NamedTuple):
 
 
 class PadMemory(NamedTuple):
-    """known: 0 where the pad is not, or how it is: STOOD_ON, LEFT, SEEN of `place`; refusals: of fixes in a row, by
-    component; first_refused: 1 where the first component of the fix at hand was.
+    """known: 0 where the pad is not, or how it is: NEVER_STOOD, STOOD_ON, LEFT, SEEN of `place`; refusals: of fixes in
+    a row, by component; first_refused: 1 where the first component of the fix at hand was; aloft_s: since when a vehicle
+    that stood nowhere is said to fly.
     """
 
     known: float = 0.0
     refusals: float = 0.0
     first_refused: float = 0.0
+    aloft_s: float = inf
 
 
 class RejectionMemory(NamedTuple):

@@ -204,7 +204,7 @@ def first_refusals(
     t0_s, t1_s = window_s
     offered = InnovationRow.of(offers)
     refused = np.isin(offered.sensor, [int(sensor) for sensor in sensors]) & (offered.reason != Reason.FUSED)
-    refused &= offered.reason != Reason.DATUM
+    refused &= ~np.isin(offered.reason, (Reason.DATUM, Reason.BEFORE_START))
     times = offered.t_s[refused] + horizon_s
     count = np.arange(len(times)) - np.searchsorted(times, times - WITHIN_S, side="right") + 1
     usual = count[times < t0_s].max(initial=0)

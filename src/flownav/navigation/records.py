@@ -195,8 +195,8 @@ class GpsMemory(NamedTuple):
 
 class PadMemory(NamedTuple):
     """known: 0 where the pad is not, or how it is: NEVER_STOOD, STOOD_ON, LEFT, SEEN of `place`; refusals: of fixes in
-    a row, by component; first_refused: 1 where the first component of the fix at hand was; aloft_s: since when a vehicle
-    that stood nowhere is said to fly.
+    a row, by component; first_refused: 1 where the first component of the fix at hand was; aloft_s: since when one that
+    stood nowhere is said to fly.
     """
 
     known: float = 0.0

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flownav.control import autopilot, go_around
+from flownav.control import autopilot, guidance
 from flownav.control.autopilot import Estimate, grounded, hovering, inner_loop, integrate, outer_loop
 from flownav.control.gains import AutopilotGains
-from flownav.control.go_around import Knowledge, Reference, path_through, reference_at, rounded
+from flownav.control.guidance import Knowledge, Reference, path_through, reference_at, rounded
 from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler, rotation_from_quaternion
 
 GAINS = AutopilotGains()
@@ -155,8 +155,8 @@ DOWN = Reference(0.0, 0.0, 0.0, 0.0, 0.0, 0.3)
 
 def allowed(height, off_n=0.0, off_e=0.0, u=0.0, v=0.0, waited=0.0):
     """How fast it may descend with the skids so high over the pad, so far beside its middle."""
-    waiting = go_around.misaligned(-off_n, -off_e, u, v, height, waited, PRECISE)
-    return go_around.descent_limit(waiting, PRECISE.align_height_m, height, DOWN.vel_d, PRECISE)
+    waiting = guidance.misaligned(-off_n, -off_e, u, v, height, waited, PRECISE)
+    return guidance.descent_limit(waiting, PRECISE.align_height_m, height, DOWN.vel_d, PRECISE)
 
 
 def test_near_the_pad_the_descent_is_slow_and_above_it_the_references():
@@ -278,11 +278,11 @@ def test_less_collective_takes_less_pedal():
 
 def test_the_skids_hang_opposite_to_the_roll_and_it_is_they_that_are_flown_to_the_pad():
     told = GAINS._replace(skids_below_cg_m=0.2, roll_trim_sine=0.1, pitch_trim_sine=0.05)
-    assert go_around.skids_beside(LEVEL, told) == pytest.approx((0.01, -0.02))
+    assert guidance.skids_beside(LEVEL, told) == pytest.approx((0.01, -0.02))
     east = rotation_from_quaternion(*quaternion_from_euler(0.0, 0.0, np.pi / 2))
-    assert go_around.skids_beside(east, told) == pytest.approx((0.02, 0.01))
+    assert guidance.skids_beside(east, told) == pytest.approx((0.02, 0.01))
     rolled = rotation_from_quaternion(*quaternion_from_euler(0.1, 0.0, 0.0))  # what it says is where they are
-    assert 0.2 * rolled[5] == pytest.approx(go_around.skids_beside(LEVEL, told)[1], rel=0.01)
+    assert 0.2 * rolled[5] == pytest.approx(guidance.skids_beside(LEVEL, told)[1], rel=0.01)
     over = HERE._replace(pos_n=-0.01, pos_e=0.02)
     state = outer_loop(hovering(told), HOLD, over, KNOWN, LEVEL, told, 1.0, 0.02)
     assert (state.pitch_sine, state.roll_sine) == pytest.approx((0.05, 0.1))

@@ -9,7 +9,7 @@ import pytest
 
 from flownav.control.autopilot import Estimate, hovering, inner_loop, outer_loop, unexplained_acceleration
 from flownav.control.gains import AutopilotGains
-from flownav.control.go_around import Knowledge, Path, Reference, reference_at, rounded
+from flownav.control.guidance import Knowledge, Path, Reference, reference_at, rounded
 from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler, rotation_from_quaternion, turned_about_down
 
 SEEDS = pytest.mark.parametrize("seed", range(8))

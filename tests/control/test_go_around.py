@@ -6,7 +6,7 @@ import pytest
 from pydantic import ValidationError
 
 from flownav.control.gains import AutopilotGains
-from flownav.control.go_around import (
+from flownav.control.guidance import (
     SEARCH_M_S,
     Approach,
     GoAround,

@@ -11,8 +11,8 @@ from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion,
 from flownav.core.measurement import Sensor, Stream
 from flownav.report.series import Track, difference
 from flownav.scoring.errors import ErrorSums, error_statistics, statistics_of, with_error
-from flownav.scoring.landings import percentile_with_interval, share_with_interval
 from flownav.scoring.path import Path, References, autopilot_errors, path_scores
+from flownav.scoring.percentiles import percentile_with_interval, share_with_interval
 from flownav.scoring.recorded import at_instants
 from flownav.scoring.reference import Motion, align, difference_at, drift_of, outage_error, velocity_of
 

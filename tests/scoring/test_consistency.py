@@ -29,7 +29,7 @@ from flownav.scoring.consistency import (
     steps_in_flight,
     verdict,
 )
-from flownav.scoring.landings import percentile_with_interval
+from flownav.scoring.percentiles import percentile_with_interval
 
 
 @pytest.mark.parametrize("flights", [1, 10, 1000])

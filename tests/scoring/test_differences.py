@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.scoring.landings import BATCHES, LEAST_ROWS, mean_difference
+from flownav.scoring.percentiles import BATCHES, LEAST_ROWS, mean_difference
 
 
 def markov(random: np.random.Generator, count: int, keep: float) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flownav.control.autopilot import Estimate
-from flownav.control.go_around import Knowledge, Reference
+from flownav.control.guidance import Knowledge, Reference
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, to_earth
 from flownav.estimation.consistency import normalised_error, pack
 from flownav.estimation.named import Attitude, PositionNed, VelocityNed

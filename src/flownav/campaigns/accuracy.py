@@ -14,7 +14,8 @@ from flownav.campaigns.requirement import scenario_of as scenario_required
 from flownav.core.text import finite_or_none
 from flownav.scoring import consistency
 from flownav.scoring.errors import MAX_POSITION_ERROR, touchdown_rows
-from flownav.scoring.landings import REST_DISTANCE, crashed, percentile_with_interval, radius, touchdown_of_flights
+from flownav.scoring.landings import REST_DISTANCE, crashed, radius, touchdown_of_flights
+from flownav.scoring.percentiles import percentile_with_interval
 from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.plan import Flight

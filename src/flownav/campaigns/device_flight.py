@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.control.go_around import Reference
+from flownav.control.guidance import Reference
 from flownav.core.compile import ONE_LANE, WARP, Lanes, Work, equation, pointer, procedure, strided
 from flownav.core.measurement import Array
 from flownav.navigation.take import navigate

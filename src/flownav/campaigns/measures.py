@@ -18,7 +18,8 @@ from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 from flownav.core.text import finite_or_none
 from flownav.scoring.errors import SCORE_COLUMNS, touchdown_rows
-from flownav.scoring.landings import EXPECTED, crashed, percentile_with_interval, share_with_interval, succeeded
+from flownav.scoring.landings import EXPECTED, crashed, succeeded
+from flownav.scoring.percentiles import percentile_with_interval, share_with_interval
 
 CRASH, NOT_LANDED = "crash", "not_landed"
 LARGEST_HORIZONTAL = "largest_horizontal_m"

@@ -14,7 +14,8 @@ from flownav.campaigns.store import INPUT, Dataset
 from flownav.core.measurement import Array
 from flownav.core.text import finite_or_none
 from flownav.scoring.errors import SCORE_COLUMNS, touchdown_rows
-from flownav.scoring.landings import EXPECTED, share_with_interval
+from flownav.scoring.landings import EXPECTED
+from flownav.scoring.percentiles import share_with_interval
 
 VERDICTS = ("landed", "went_around", "crashed", "unfinished")
 YES_OR_NO = ("crash", "not_landed")  # measures that say yes or no: their share is a figure

@@ -17,7 +17,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from flownav.core.measurement import Array
-from flownav.scoring.landings import share_with_interval
+from flownav.scoring.percentiles import share_with_interval
 
 Verdict = Literal["pass", "fail", "not shown"]
 

@@ -8,9 +8,9 @@ truth), the inner loop on the INS attitude and the flybarless unit's gyros.
 
 from typing import NamedTuple
 
-from flownav.control import go_around
+from flownav.control import guidance
 from flownav.control.gains import AutopilotGains
-from flownav.control.go_around import Reference
+from flownav.control.guidance import Reference
 from flownav.core.compile import clamp, equation, magnitude, replacing, smaller
 from flownav.core.frames import GRAVITY_M_S2, Rotation, heading_cosine_sine, to_earth
 
@@ -136,20 +136,20 @@ class Steered(NamedTuple):
     down: float
     looking: bool
     waited_s: float
-    around: go_around.GoAround
+    around: guidance.GoAround
 
 
 @equation
 def steer(
-    state: AutopilotState, reference: Reference, estimate: Estimate, known: go_around.Knowledge, rotation: Rotation,
+    state: AutopilotState, reference: Reference, estimate: Estimate, known: guidance.Knowledge, rotation: Rotation,
     gains: AutopilotGains, may_land: float, dt: float,
 ) -> Steered:  # fmt: skip
     """Position errors to velocities, through the gate before the touchdown and the way round."""
-    skids_n, skids_e = go_around.skids_beside(rotation, gains)
+    skids_n, skids_e = guidance.skids_beside(rotation, gains)
     off_n, off_e = reference.pos_n - estimate.pos_n - skids_n, reference.pos_e - estimate.pos_e - skids_e
     height_m = gains.pad_pos_d_m - estimate.pos_d
-    looking = go_around.seeks(known, state.away, height_m, gains)
-    search_n, search_e = go_around.search_offset(state.searched_s, gains)
+    looking = guidance.seeks(known, state.away, height_m, gains)
+    search_n, search_e = guidance.search_offset(state.searched_s, gains)
     off_n, off_e = off_n + (search_n if looking else 0.0), off_e + (search_e if looking else 0.0)
     vel_n, vel_e = gains.position_gain * off_n, gains.position_gain * off_e
     speed_limit = gains.horizontal_speed_limit_m_s
@@ -161,17 +161,15 @@ def steer(
     est_n, est_e, est_d = to_earth(rotation, estimate.u, estimate.v, estimate.w)
     landing = state.flying > 0.0 and may_land > 0.0 and state.contact_time_s == 0.0
     off_m2, speed_m2_s2 = off_n * off_n + off_e * off_e, est_n * est_n + est_e * est_e
-    now = go_around.Approach(off_m2, speed_m2_s2, height_m, state.waited_s, state.searched_s, landing)
-    around = go_around.mind_landing(
-        go_around.GoAround(state.away, state.go_arounds, state.since_s), known, now, gains, dt
+    now = guidance.Approach(off_m2, speed_m2_s2, height_m, state.waited_s, state.searched_s, landing)
+    around = guidance.mind_landing(
+        guidance.GoAround(state.away, state.go_arounds, state.since_s), known, now, gains, dt
     )
     away = around.away > 0.0
-    waiting = known.pad_found > 0.0 and go_around.misaligned(
-        off_n, off_e, est_n, est_e, height_m, state.waited_s, gains
-    )
+    waiting = known.pad_found > 0.0 and guidance.misaligned(off_n, off_e, est_n, est_e, height_m, state.waited_s, gains)
     gate_m = gains.search_height_m if looking else gains.align_height_m
-    gated_d = smaller(vel_d, go_around.descent_limit(waiting or looking, gate_m, height_m, reference.vel_d, gains))
-    vel_d = go_around.climb_out(height_m, gains) if away else gated_d
+    gated_d = smaller(vel_d, guidance.descent_limit(waiting or looking, gate_m, height_m, reference.vel_d, gains))
+    vel_d = guidance.climb_out(height_m, gains) if away else gated_d
     waited_s = state.waited_s + dt if (waiting and landing) or away else state.waited_s
 
     error_forward, error_right = along_heading(rotation, vel_n - est_n, vel_e - est_e)
@@ -180,7 +178,7 @@ def steer(
 
 @equation
 def outer_loop(
-    state: AutopilotState, reference: Reference, estimate: Estimate, known: go_around.Knowledge, rotation: Rotation,
+    state: AutopilotState, reference: Reference, estimate: Estimate, known: guidance.Knowledge, rotation: Rotation,
     gains: AutopilotGains, may_land: float, dt: float,
 ) -> AutopilotState:  # fmt: skip
     """Position and velocity errors to tilt and collective commands (50 Hz)."""

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 # around an argument's name in a message; Unicode keeps them for a program's own use, so that no text of a user has them
 BEGIN, END = "\ufdd0", "\ufdd1"
-ARGUMENT = re.compile(f"{BEGIN}([a-z_]+){END}")
+ARGUMENT = re.compile(f"{BEGIN}(\\w+){END}")
 
 
 def arg(name: str) -> str:

@@ -88,6 +88,11 @@ Column = NDArray[Any]
 Table = dict[str, Column]
 
 
+def mapping(value: Any) -> Mapping[str, Any]:
+    """The value where it is a mapping, an empty one elsewhere: manifests come from files."""
+    return value if isinstance(value, Mapping) else {}
+
+
 @dataclass
 class Record:
     """A flight as data.

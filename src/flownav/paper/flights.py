@@ -14,7 +14,7 @@ from flownav.core.record import Record
 from flownav.lab.optics.firmware import EARLY_GYRO_SCALE
 from flownav.lab.rig.instruments import SONAR_ECHO_S, SONAR_PERIOD_S
 from flownav.scoring.errors import STATES, percentile_of_paper, published, scores_of_flight, scores_of_flights
-from flownav.scoring.landings import spread
+from flownav.scoring.percentiles import spread
 from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.engine import fly_blocks, fly_written
 from flownav.simulation.flight_record import record_of

@@ -26,7 +26,7 @@ from flownav.report import html as report
 from flownav.report.figures_states import View
 from flownav.report.panels import Panel, Section
 from flownav.report.series import moments
-from flownav.scoring.landings import spread
+from flownav.scoring.percentiles import spread
 
 APART_M = 0.008  # the paper's dots to the left, ours to the right
 RING: dict[str, Any] = {"size": 8, "symbol": "circle-open", "line": {"width": 1.6}}

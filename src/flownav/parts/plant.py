@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from flownav.control.go_around import reference_at
+from flownav.control.guidance import reference_at
 from flownav.core.compile import ONE_LANE, runge_kutta
 from flownav.core.errors import InputError
 from flownav.core.frames import GRAVITY_M_S2, rotation_from_quaternion

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from typing import NamedTuple, Protocol, runtime_checkable
 
 from flownav.control.gains import AutopilotGains
-from flownav.control.go_around import Reference
+from flownav.control.guidance import Reference
 from flownav.core.measurement import Array, Sensor
 from flownav.navigation.told import NavigatorSettings
 from flownav.vehicle.state import Around, Controls

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from flownav.core.measurement import Sensor
-from flownav.core.record import Record
+from flownav.core.record import Record, mapping
 from flownav.report import series
 from flownav.report.panels import NONE, Part, Tile, metres, number
-from flownav.report.series import has, mapping, readings
+from flownav.report.series import has, readings
 
 UNIT_AFTER_NUMBER = re.compile(r"(\d) (m/s|m|s)\b")
 KINDS = {

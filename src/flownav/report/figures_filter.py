@@ -3,11 +3,11 @@
 import numpy as np
 
 from flownav.core.measurement import COLUMNS, Array, Sensor
-from flownav.core.record import POSITION_NED, PROTECTION_LEVELS, Record
+from flownav.core.record import POSITION_NED, PROTECTION_LEVELS, Record, mapping
 from flownav.report.chart import Stack, sliding_mean, sliding_rms
 from flownav.report.figures_innovation import SENSOR_TITLES, innovation_table
 from flownav.report.panels import Panel, number
-from flownav.report.series import Track, difference, mapping, moments, outages, readings, start_end_s, track
+from flownav.report.series import Track, difference, moments, outages, readings, start_end_s, track
 from flownav.scoring.consistency import MODEST_SQUARES, SCORED, chi_square_band, consistency_of, verdict
 
 STD_POSITION = tuple(f"std_{name}" for name in POSITION_NED)

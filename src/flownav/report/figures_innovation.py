@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.measurement import COLUMNS, Array, Sensor
-from flownav.core.record import Record
+from flownav.core.record import Record, mapping
 from flownav.report.chart import Stack
 from flownav.report.panels import Panel
-from flownav.report.series import mapping, moments, outages, start_end_s, track
+from flownav.report.series import moments, outages, start_end_s, track
 
 INNOVATION_NUMBERS = ("t_s", "observation_variance", "innovation", "innovation_variance", "test_ratio", "fused")
 SMALLEST_RATIO = 0.01  # test ratios below are not drawn: the axis is logarithmic

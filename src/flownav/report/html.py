@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from flownav.core import guard
-from flownav.core.record import Record
+from flownav.core.record import Record, mapping
 from flownav.report import (
     content,
     figures_errors,
@@ -22,7 +22,7 @@ from flownav.report.chart import DOT_POINTS, LINE_POINTS
 from flownav.report.figures_states import Paths, paths_of
 from flownav.report.page_data import Columns, paths_data, sections_data
 from flownav.report.panels import Panel, Section
-from flownav.report.series import Window, first_pad_fix_s, has, mapping, moments, outages, start_end_s
+from flownav.report.series import Window, first_pad_fix_s, has, moments, outages, start_end_s
 from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE
 from flownav.scoring.phases import Phase, phases_of
 

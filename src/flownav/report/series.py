@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flownav.core.measurement import COLUMNS, Array, Sensor
-from flownav.core.record import QUATERNION, Record
+from flownav.core.record import QUATERNION, Record, mapping
 from flownav.scoring.phases import phases_of
 
 Window = tuple[float, float]
@@ -85,11 +85,6 @@ def readings(record: Record, sensor: Sensor) -> Track | None:
 def delay_s(record: Record, sensor_name: str) -> float:
     """The sensor's delay [s] that the record states in manifest["delays_s"]; 0 where it states none."""
     return float(mapping(record.manifest.get("delays_s")).get(sensor_name) or 0.0)
-
-
-def mapping(value: Any) -> Mapping[str, Any]:
-    """The value where it is a mapping, an empty one elsewhere: manifests come from files."""
-    return value if isinstance(value, Mapping) else {}
 
 
 def at(t_s: Array, source: Track) -> Array:

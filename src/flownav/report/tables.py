@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from flownav.core.record import Record
+from flownav.core.record import Record, mapping
 from flownav.report import series
 from flownav.report.figures_innovation import SENSOR_TITLES
 from flownav.report.panels import NONE, number
@@ -34,11 +34,11 @@ class ScoreRow:
 
 def score_rows(record: Record) -> list[ScoreRow]:
     """One row for each scored state."""
-    states = series.mapping(series.mapping(record.manifest.get("scores")).get("states"))
-    published = series.mapping(series.mapping(record.manifest.get("paper")).get("states"))
+    states = mapping(mapping(record.manifest.get("scores")).get("states"))
+    published = mapping(mapping(record.manifest.get("paper")).get("states"))
     rows = []
     for key, (direction, unit) in STATES.items():
-        mine, theirs = series.mapping(states.get(key)), series.mapping(published.get(key))
+        mine, theirs = mapping(states.get(key)), mapping(published.get(key))
         if mine:
             mean, std, rms, largest = (number(mine.get(f"{kind}_error")) for kind in ("mean", "std", "rms", "max"))
             beside = (number(theirs.get("mean_error")), number(theirs.get("std_error")))
@@ -48,7 +48,7 @@ def score_rows(record: Record) -> list[ScoreRow]:
 
 def outage_rows(record: Record, phases: Sequence[Phase] = ()) -> list[tuple[str, str, str, str, str]]:
     """Scored GPS outages as (window, phases, rms, max, where GPS was cut); the median and the worst last, if scored."""
-    scores, here = series.mapping(record.manifest.get("scores")), series.outages(record)
+    scores, here = mapping(record.manifest.get("scores")), series.outages(record)
     rows = []
     for outage in series.scored_outages(record):
         window = (float(outage["t0"]), float(outage["t1"]))
@@ -98,7 +98,7 @@ def events(record: Record, phases: Sequence[Phase] = ()) -> EventTables:
 
 def groups(tree: Any) -> list[tuple[str, list[tuple[str, str]]]]:
     """A nested mapping as (group, [(dotted key, value as text)]); its own plain values come first, as "general"."""
-    tree = series.mapping(tree)
+    tree = mapping(tree)
     plain = [(str(key), text(value)) for key, value in tree.items() if not isinstance(value, Mapping)]
     nested = [(str(key), list(_flat(value))) for key, value in tree.items() if isinstance(value, Mapping)]
     return ([("general", plain)] if plain else []) + nested
@@ -156,12 +156,12 @@ def rejected_rows(record: Record, phases: Sequence[Phase] = ()) -> list[tuple[st
 
     Records from before readings were counted have components only.
     """
-    scores = series.mapping(record.manifest.get("scores"))
-    readings_of = series.mapping(scores.get("readings"))
+    scores = mapping(record.manifest.get("scores"))
+    readings_of = mapping(scores.get("readings"))
     rows = []
-    for sensor, reasons in series.mapping(scores.get("rejected")).items():
-        whole = series.mapping(series.mapping(readings_of.get(sensor)).get("rejected"))
-        rows += [(sensor, reason, whole.get(reason), count) for reason, count in series.mapping(reasons).items()]
+    for sensor, reasons in mapping(scores.get("rejected")).items():
+        whole = mapping(mapping(readings_of.get(sensor)).get("rejected"))
+        rows += [(sensor, reason, whole.get(reason), count) for reason, count in mapping(reasons).items()]
     rows.sort(key=lambda row: -float(row[3]))
     mostly = rejected_mostly_in(record, phases)
     return [
@@ -173,11 +173,11 @@ def rejected_rows(record: Record, phases: Sequence[Phase] = ()) -> list[tuple[st
 
 def sensor_rows(record: Record) -> list[tuple[str, str, str, str, str]]:
     """Sensors as (name, from and to in seconds, innovations tested, their mean square per component, verdict)."""
-    scores = series.mapping(record.manifest.get("scores"))
-    spans, judged = series.mapping(scores.get("coverage")), series.mapping(scores.get("consistency"))
+    scores = mapping(record.manifest.get("scores"))
+    spans, judged = mapping(scores.get("coverage")), mapping(scores.get("consistency"))
     rows = []
     for name in dict.fromkeys([*spans, *judged]):
-        span, found = series.mapping(spans.get(name)), series.mapping(judged.get(name))
+        span, found = mapping(spans.get(name)), mapping(judged.get(name))
         heard = f"{number(span.get('t0'), 1)} to {number(span.get('t1'), 1)}" if span else NONE
         mean, tested, said = NONE, NONE, ""
         if found:

@@ -14,7 +14,8 @@ from flownav.core.compile import equation, kernel, larger, magnitude, sparingly
 from flownav.core.measurement import Array
 from flownav.core.parameter_files import shipped
 from flownav.core.text import finite_or_none
-from flownav.scoring.landings import crashed, spread, succeeded, touchdown_of_flight, touchdown_of_flights
+from flownav.scoring.landings import crashed, succeeded, touchdown_of_flight, touchdown_of_flights
+from flownav.scoring.percentiles import spread
 from flownav.scoring.touchdown import TOUCHDOWN_COLUMNS
 
 STATES = ("x", "y", "z", "u", "v", "w")

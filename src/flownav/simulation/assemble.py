@@ -9,7 +9,7 @@ import numpy as np
 
 from flownav.control.design import gains_for
 from flownav.control.gains import AutopilotGains
-from flownav.control.go_around import path_through, rounded
+from flownav.control.guidance import path_through, rounded
 from flownav.control.margins import margins_of
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor

@@ -6,7 +6,7 @@ import numpy as np
 
 from flownav.control.autopilot import AutopilotState, Estimate, inner_loop, landing_logic, outer_loop
 from flownav.control.gains import AutopilotGains
-from flownav.control.go_around import Knowledge, Reference
+from flownav.control.guidance import Knowledge, Reference
 from flownav.core.compile import Lanes, Work, equation, invoke, procedure, replacing
 from flownav.core.frames import GRAVITY_M_S2, Quaternion, quaternion_product, rotation_from_quaternion
 from flownav.core.measurement import Sensor

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.control.autopilot import grounded, hovering
-from flownav.control.go_around import Reference, reference_at
+from flownav.control.guidance import Reference, reference_at
 from flownav.core.compile import Lanes, Work, equation, invoke, kernel, pointer, replacing
 from flownav.estimation import paper_filter
 from flownav.estimation.paper_filter import STATES, PaperModel, start

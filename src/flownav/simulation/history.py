@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.control.go_around import Reference
+from flownav.control.guidance import Reference
 from flownav.core.compile import Lanes, Work, equation
 from flownav.core.frames import rotation_from_quaternion, to_earth
 from flownav.core.record import POSITION_NED, QUATERNION, TABLES, VELOCITY_BODY

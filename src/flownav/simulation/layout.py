@@ -7,7 +7,7 @@ that kernels see them as compile-time numbers.
 from typing import Any
 
 from flownav.control.autopilot import AutopilotState, Estimate
-from flownav.control.go_around import Knowledge
+from flownav.control.guidance import Knowledge
 from flownav.core.compile import Layout, lane_access
 from flownav.estimation.paper_filter import STATES, kalman_row_count, kalman_rows
 from flownav.navigation.records import Reading

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.control.go_around import Knowledge, Reference
+from flownav.control.guidance import Knowledge, Reference
 from flownav.core.compile import Lanes, Work, equation, invoke, larger, procedure
 from flownav.core.frames import conjugate, quaternion_product, rotation_from_quaternion, to_body, to_earth
 from flownav.estimation.consistency import normalised_error

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.control.gains import AutopilotGains
-from flownav.control.go_around import Path
+from flownav.control.guidance import Path
 from flownav.estimation.paper_filter import PaperModel
 from flownav.sensors.geometry import Ground
 from flownav.simulation.ground import RecirculationParameters

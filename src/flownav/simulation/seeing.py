@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flownav.control.autopilot import AutopilotState
-from flownav.control.go_around import Knowledge
+from flownav.control.guidance import Knowledge
 from flownav.core.compile import equation, replacing, write_function
 from flownav.core.frames import Rotation, rotation_from_quaternion, to_earth
 from flownav.navigation.records import Reading

@@ -13,7 +13,7 @@ from flownav.campaigns.rare.likely import Response, effective, rank_inputs, rank
 from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 from flownav.core.text import finite_or_none
-from flownav.scoring.landings import share_with_interval
+from flownav.scoring.percentiles import share_with_interval
 from flownav.scoring.touchdown import Limits
 from flownav.simulation.assemble import Setup
 

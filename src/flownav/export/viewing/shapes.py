@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from flownav.core.frames import velocity_from_flow
 from flownav.core.measurement import Array
-from flownav.core.record import Record
-from flownav.report.series import mapping
+from flownav.core.record import Record, mapping
 
 Outline = Array  # (n, 3) points of one line in body FRD [m]
 

@@ -6,7 +6,7 @@ It hovers and follows a path in calm air; with a steady wind it stands off, as a
 import numpy as np
 
 from flownav.control.gains import AutopilotGains
-from flownav.control.go_around import Reference
+from flownav.control.guidance import Reference
 from flownav.core.measurement import Array
 from flownav.parts.protocols import Flown
 from flownav.parts.tools import matrix

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from flownav.core.measurement import Array
-from flownav.core.record import POSITION_NED, VELOCITY_BODY, Record
+from flownav.core.record import POSITION_NED, VELOCITY_BODY, Record, mapping
 from flownav.core.text import finite_or_none
-from flownav.report.series import mapping
-from flownav.scoring.landings import CONFIDENCE, mean_difference
+from flownav.scoring.landings import CONFIDENCE
+from flownav.scoring.percentiles import mean_difference
 from flownav.scoring.phases import phases_of
 from flownav.scoring.recorded import errors_of
 

@@ -96,7 +96,7 @@ def test_biases_start_with_their_size_and_walk_with_the_root_of_time() -> None:
 
 def test_errors_of_a_unit_are_matrices_of_rate_and_force() -> None:
     p = parameters()
-    unit = InertialUnit(*(1e-3 * (i + 1.0) for i in range(27)), 1.0)
+    unit = InertialUnit(*(1e-3 * (i + 1.0) for i in range(27)), 1.0, 0.0)
     truth = ImuReading(0.1, -0.2, 0.3, 1.0, 2.0, -9.0)
     _, reading = step_inertial(settled(p), unit, truth, QUIET, p)
     scale, force, stretch = (np.array(unit[9 * i : 9 * i + 9]).reshape(3, 3) for i in range(3))
@@ -107,7 +107,7 @@ def test_errors_of_a_unit_are_matrices_of_rate_and_force() -> None:
 
 def test_units_are_drawn_with_the_sheets_sizes() -> None:
     p = parameters()
-    unit = draw_inertial(InertialUnit(*(1.0,) * 28), p)
+    unit = draw_inertial(InertialUnit(*(1.0,) * 29), p)
     diagonal = {"xx", "yy", "zz"}
     for name, value in unit._asdict().items():
         kind, _, place = name.partition("_")
@@ -116,6 +116,7 @@ def test_units_are_drawn_with_the_sheets_sizes() -> None:
             "force": math.radians(0.02) / GRAVITY_M_S2,
             "accel": 0.003 if place in diagonal else math.radians(0.3),
             "vibration": 1.3,
+            "faster": 0.01,
         }[kind]
         assert value == pytest.approx(expected), name
     for name, fields in moved_by(InertialUnit, lambda n: draw_inertial(n, p)).items():
@@ -157,6 +158,19 @@ def test_a_tone_beyond_half_the_rate_appears_at_its_alias() -> None:
     assert np.argmax(spectrum) == 30  # 3 Hz in 10 s
     mean = math.sin(math.pi * 0.97) / (math.pi * 0.97)
     assert spectrum[30] == pytest.approx(2.0 * abs(mean) / math.hypot(1.0, 97.0 / 98.0), rel=1e-6)
+
+
+def test_a_rotor_that_turns_faster_shakes_at_its_own_frequency() -> None:
+    """By 3 %: after 1000 periods the tone is where the exact turn of each period has brought it, as large as before."""
+    p = SHEET.parameters(ROTOR_RAD_S, BLADES)
+    state = settled(p)
+    for _ in range(1000):
+        state, _ = step_inertial(state, PERFECT._replace(faster=0.03), HOVER, QUIET, p)
+    for cosine, sine, speed in (
+        (state.rev_cosine, state.rev_sine, ROTOR_RAD_S), (state.blade_cosine, state.blade_sine, BLADES * ROTOR_RAD_S)
+    ):  # fmt: skip
+        turned = np.exp(1j * 1.03 * speed * SHEET.period_s * 1000)
+        assert abs((cosine + 1j * sine) - turned) < 1e-4
 
 
 def test_a_flights_vibration_is_its_factor_times_the_sheets() -> None:

@@ -5,7 +5,16 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.compile import equation, larger, replacing
-from flownav.navigation.motion_records import ImuMemory, MotionMemory, MotionStep, OwedMotion, SpentMotion, SteadyForce
+from flownav.navigation.motion_records import (
+    ImuMemory,
+    MotionMemory,
+    MotionStep,
+    OwedMotion,
+    SpentMotion,
+    SteadyForce,
+    ToneMemory,
+)
+from flownav.navigation.notch import heard_tones
 from flownav.navigation.records import Reading, StartMemory
 from flownav.navigation.tape import IMU_LOST
 from flownav.navigation.told import ImuSettings
@@ -37,6 +46,18 @@ def said_by(reading: Reading) -> Motion:
 def remembered(m: ImuMemory) -> Motion:
     """What the newest one that was kept said."""
     return (m.gyro_x, m.gyro_y, m.gyro_z, m.accel_x, m.accel_y, m.accel_z)
+
+
+@equation
+def without_tones(motion: Motion, m: ToneMemory) -> Motion:
+    """What a reading says without the tones that were heard in it."""
+    return (motion[0], motion[1], motion[2], motion[3] - m.taken_x, motion[4] - m.taken_y, motion[5] - m.taken_z)
+
+
+@equation
+def told_noise(least: float, power: float, s: ImuSettings) -> float:
+    """Density of the accelerometer's noise [m/s2/sqrt(Hz)]: as told, or as what is left beside the tones shows."""
+    return larger(least, np.sqrt(power)) if s.notch_rotor_hz > 0.0 else least
 
 
 @equation
@@ -104,14 +125,16 @@ def judge_motion(
     heard: an inertial reading is at hand; where none ever is, none stands for the step. After a gap it knows nothing of
     the gap, which is coasted. Where no time passes there is no gap.
     """
-    m, spent, owed = memory
+    m, spent, owed, before = memory
     started = start.started > 0.0
     period_s = t_s - m.read_s
     fresh = period_s <= s.imu_stale_s
     now = heard and sound(reading)
     loses = now and not fresh and np.isfinite(m.read_s) and started
-    held = remembered(m)
-    between = motion_between(held, said_by(reading), s.imu_integrates)
+    held = without_tones(remembered(m), before)
+    force = (reading.value_3, reading.value_4, reading.value_5)
+    tones = heard_tones(force, held[3:6], before, period_s if fresh else 0.0, s) if now else before
+    between = motion_between(held, without_tones(said_by(reading), tones), s.imu_integrates)
     moving = fresh and started
     p = paid(between[0], held[0], spent.gyro_x, owed.gyro_x, step_s, period_s, now, moving)
     q = paid(between[1], held[1], spent.gyro_y, owed.gyro_y, step_s, period_s, now, moving)
@@ -119,7 +142,9 @@ def judge_motion(
     x = paid(between[3], held[3], spent.accel_x, owed.accel_x, step_s, period_s, now, moving)
     y = paid(between[4], held[4], spent.accel_y, owed.accel_y, step_s, period_s, now, moving)
     z = paid(between[5], held[5], spent.accel_z, owed.accel_z, step_s, period_s, now, moving)
-    told, told_down = s.accel_noise_m_s2_rt_hz, s.accel_noise_m_s2_rt_hz * s.accel_noise_down_share
+    least_down = s.accel_noise_m_s2_rt_hz * s.accel_noise_down_share
+    told = told_noise(s.accel_noise_m_s2_rt_hz, tones.noise_power, s)
+    told_down = told_noise(least_down, tones.noise_power, s)
     accel = doubt.level * told if moving else s.coasting_accel_m_s2_rt_hz
     accel_down = larger(doubt.level, doubt.down) * told_down if moving else s.coasting_accel_m_s2_rt_hz
     gyro = s.gyro_noise_rad_s_rt_hz if moving else s.coasting_rate_rad_s_rt_hz
@@ -134,6 +159,7 @@ def judge_motion(
             ),
             SpentMotion(p.spent, q.spent, r.spent, x.spent, y.spent, z.spent),
             OwedMotion(p.owed, q.owed, r.owed, x.owed, y.owed, z.owed),
+            tones,
         ),
         MotionNoise(accel * accel, accel_down * accel_down, gyro * gyro),
         Event(IMU_LOST if loses else -1, period_s),

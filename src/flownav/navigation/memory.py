@@ -34,6 +34,7 @@ from flownav.navigation.motion_records import (
     SpikeMemory,
     StandMemory,
     SteadyForce,
+    ToneMemory,
 )
 from flownav.navigation.records import (
     AidMemory,
@@ -96,7 +97,7 @@ MEMORY.keep(FlowInnovation, 3, "component")
 RANGE_MISSING = MEMORY.row(Look, "unranged")
 SCALE_DOUBT = MEMORY.keep(ScaleDoubt)
 MEMORY.keep(SteadyForce)
-for _record in (MotionStep, SpentMotion, OwedMotion, FlowSignMemory, SuspicionMemory):
+for _record in (MotionStep, SpentMotion, OwedMotion, ToneMemory, FlowSignMemory, SuspicionMemory):
     MEMORY.keep(_record)
 PROTECTION = MEMORY.keep(Levels)  # horizontal and vertical
 SUSPECTED = MEMORY.row(SuspicionMemory, "suspected")

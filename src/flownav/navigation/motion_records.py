@@ -163,6 +163,38 @@ class OwedMotion(NamedTuple):
     accel_z: float = 0.0
 
 
+class ToneMemory(NamedTuple):
+    """Tones of the rotor and of its blades in the newest inertial reading's specific force [m/s2], body FRD: each as a
+    phasor, the value at hand and that a quarter turn away; what both notches take off the reading; by how much the
+    tones are faster than told [Hz]; the power density of the noise that is left [m2/s3]; the level changes
+    from one reading to the next, without tones; and the smoothed force.
+    """
+
+    rotor_x: float = 0.0
+    rotor_x_across: float = 0.0
+    rotor_y: float = 0.0
+    rotor_y_across: float = 0.0
+    rotor_z: float = 0.0
+    rotor_z_across: float = 0.0
+    blades_x: float = 0.0
+    blades_x_across: float = 0.0
+    blades_y: float = 0.0
+    blades_y_across: float = 0.0
+    blades_z: float = 0.0
+    blades_z_across: float = 0.0
+    taken_x: float = 0.0
+    taken_y: float = 0.0
+    taken_z: float = 0.0
+    rotor_off_hz: float = 0.0
+    blades_off_hz: float = 0.0
+    noise_power: float = 0.0
+    change_x: float = 0.0
+    change_y: float = 0.0
+    mean_x: float = 0.0
+    mean_y: float = 0.0
+    mean_z: float = 0.0
+
+
 class SteadyForce(NamedTuple):
     """Specific force NED [m/s2], smoothed as a GPS receiver smooths its velocity."""
 
@@ -177,3 +209,4 @@ class MotionMemory(NamedTuple):
     imu: ImuMemory
     spent: SpentMotion
     owed: OwedMotion
+    tones: ToneMemory

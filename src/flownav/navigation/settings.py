@@ -62,6 +62,13 @@ class NavigatorSettingsFile(ParameterModel):
         le=1,
         description="1: a reading is the mean since the last, of a unit that integrates; 0: of its instant",
     )
+    notch_rotor_hz: Number = Field(
+        0.0,
+        ge=0,
+        le=500,
+        description="the rotor's vibration, as the IMU reads it, is taken off its forces; 0: it is not",
+    )
+    notch_blades_hz: Number = Field(0.0, ge=0, le=500, description="and that of its blades")
     vibration_free_m_s2: Number = Field(
         1.0, ge=0, le=100, description="sample-to-sample accelerometer noise, rms, that harms nothing"
     )

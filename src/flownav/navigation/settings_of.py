@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from flownav.core.frames import GRAVITY_M_S2
 from flownav.core.parameter_files import check
+from flownav.navigation.notch import WIDTH
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
 from flownav.sensors.barometer import BarometerSheet
@@ -25,6 +26,12 @@ BIAS_LIMIT_SIGMAS = 3.0  # a limit leaves room for all but 3 in 1000 units; chos
 VIBRATION_MARGIN = 2.0  # chosen, not measured: what is beyond twice the stated vibration, the sheet does not know
 # slower motion is held by what aids the IMU: level velocity errs by 1.17 of what is stated with 2, by 1.02 with 4
 AIDED_HZ = 3.0
+LEAST_NOTCH_HZ = 8.0  # chosen: a notch below would take the vehicle's own motion
+NOTCHED = ("level_m_s2", "vertical_m_s2")
+# what a unit that integrates leaves out of the position; with 0.01, the default, w errs by 0.7 of what is stated at
+# `approach`, with this by 1.0
+INTEGRATED_M_RT_S = 0.002
+FOLLOWED_TO = 0.002  # a notch follows its tone within this (test_notch), whatever the rotor does
 LAGS_AS_STATED = 2.0  # of a receiver's filter: 0.2 to 0.3 s were found in two logs where sheets say 0.1 s (validate)
 WASH_LASTS_S = 3.0  # chosen, not measured: how long a rotor's wash deceives a barometer
 CLIMB_M_S = 1.0  # chosen: a lag errs by its length in a descent at this speed
@@ -133,7 +140,7 @@ def of_inertial(sheet: InertialSheet, rotor_hz: tuple[float, float] | None = Non
 
     A tone that aliases to near 0 Hz does the harm of white noise of its rms. One that stays at a frequency f integrates
     to a velocity that swings by A/(2 pi f) and comes back: above AIDED_HZ, below which other sensors hold the velocity,
-    it counts by AIDED_HZ/f.
+    it counts by AIDED_HZ/f, and by what a notch leaves of it where there is one.
     """
     gyro, accel, rt_period_s = sheet.gyro, sheet.accelerometer, math.sqrt(sheet.period_s)
     level_m_s2, down_m_s2 = (_shaken(sheet, part, rotor_hz) for part in ("level_m_s2", "vertical_m_s2"))
@@ -161,6 +168,22 @@ def of_inertial(sheet: InertialSheet, rotor_hz: tuple[float, float] | None = Non
         "gyro_bias_limit_rad_s": max(float(usual.gyro_bias_limit_rad_s), BIAS_LIMIT_SIGMAS * gyro_bias),
         "vibration_free_m_s2": max(float(usual.vibration_free_m_s2), VIBRATION_MARGIN * jumping_m_s2),
         "imu_integrates": 1.0,
+        "position_walk_m_rt_s": INTEGRATED_M_RT_S,
+    } | _notches(sheet, rotor_hz)
+
+
+def _notches(sheet: InertialSheet, rotor_hz: tuple[float, float] | None) -> Keys:
+    """A notch about each tone that shakes the unit, at the frequency at which it is read."""
+    if rotor_hz is None:
+        return {}
+    tones = (
+        ("notch_rotor_hz", sheet.vibration.rotor, rotor_hz[0]),
+        ("notch_blades_hz", sheet.vibration.blades, rotor_hz[1]),
+    )
+    return {
+        key: read_hz
+        for key, tone, hz in tones
+        if (tone.level_m_s2 or tone.vertical_m_s2) and (read_hz := _read_hz(hz, float(sheet.rate_hz))) > LEAST_NOTCH_HZ
     }
 
 
@@ -171,16 +194,29 @@ def _shaken(sheet: InertialSheet, part: str, rotor_hz: tuple[float, float] | Non
     """
     left = [1.0, 1.0]
     if rotor_hz is not None:
-        left = [abs(sheet.left_of_tone(hz)) * (1.0 if whole else _harm(hz, float(sheet.rate_hz))) for hz in rotor_hz]
+        off = FOLLOWED_TO if part in NOTCHED else None
+        left = [
+            abs(sheet.left_of_tone(hz)) * (1.0 if whole else _harm(hz, float(sheet.rate_hz), off)) for hz in rotor_hz
+        ]
     shake = sheet.vibration
     amplitude = math.hypot(left[0] * getattr(shake.rotor, part), left[1] * getattr(shake.blades, part))
     return (1.0 + shake.spread) * amplitude / math.sqrt(2.0)
 
 
-def _harm(tone_hz: float, rate_hz: float) -> float:
-    """The share by which a tone counts as white noise, read at this rate."""
-    read_hz = abs(tone_hz - rate_hz * round(tone_hz / rate_hz))
-    return min(1.0, AIDED_HZ / read_hz) if read_hz > 0.0 else 1.0
+def _read_hz(tone_hz: float, rate_hz: float) -> float:
+    """The frequency at which a tone is read at this rate."""
+    return abs(tone_hz - rate_hz * round(tone_hz / rate_hz))
+
+
+def _harm(tone_hz: float, rate_hz: float, off: float | None) -> float:
+    """The share by which a tone counts as white noise, read at this rate. off: the share by which it misses its notch,
+    None without one.
+    """
+    read_hz = _read_hz(tone_hz, rate_hz)
+    swings = min(1.0, AIDED_HZ / read_hz) if read_hz > 0.0 else 1.0
+    return swings * (
+        1.0 if off is None or read_hz < LEAST_NOTCH_HZ else min(1.0, 2.0 * WIDTH * off * tone_hz / read_hz)
+    )
 
 
 # -- position -----------------------------------------------------------------------------------------------
@@ -188,7 +224,7 @@ def of_gps_receiver(sheet: GpsReceiverSheet) -> Keys:
     """The receiver's errors as its sheet splits them, so that little is left for what it states of each fix.
 
     A sheet has the median of its class; what is stated is the rms over lognormal days and places, exp(spread^2) of the
-    sheet's own spread and half as much again for what the class's figure is off by.
+    sheet's own spread and half as much again for what the class's figure is off by; the velocity's as the position's.
     """
     position, velocity = sheet.position, sheet.velocity
     rms = math.exp(1.5 * position.spread * position.spread)
@@ -203,8 +239,8 @@ def of_gps_receiver(sheet: GpsReceiverSheet) -> Keys:
         "gps_white_sigma_m": max(math.hypot(position.white_sigma_m, step_m), 1e-3),
         "gps_white_sigma_down_m": max(math.hypot(position.white_sigma_down_m, step_m), 1e-3),
         "gps_white_share": LEAST_SHARE,
-        "gps_velocity_sigma_m_s": velocity.sigma_m_s,
-        "gps_velocity_sigma_down_m_s": velocity.sigma_down_m_s,
+        "gps_velocity_sigma_m_s": rms * velocity.sigma_m_s,
+        "gps_velocity_sigma_down_m_s": rms * velocity.sigma_down_m_s,
         "gps_velocity_tau_s": max(velocity.tau_s, sheet.period_s),
         "gps_velocity_white_m_s": max(math.hypot(velocity.white_m_s, step_m_s), 1e-3),
         "gps_velocity_white_down_m_s": max(math.hypot(velocity.white_down_m_s, step_m_s), 1e-3),

@@ -151,6 +151,8 @@ class ImuSettings(NamedTuple):
     coasting_rate_rad_s_rt_hz: float
     imu_integrates: float
     imu_stale_s: float
+    notch_rotor_hz: float
+    notch_blades_hz: float
     vibration_free_m_s2: float
     vibration_walk_per_rt_s: float
     vibration_bias_share: float

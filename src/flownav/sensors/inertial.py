@@ -15,7 +15,7 @@ deviation of N/sqrt(2 t). A bias walks by `walk` sqrt(t).
 and y; z and the rates have amplitudes of their own. The mean over the period T of a tone of frequency f is the tone at
 the middle of the period times sin(pi f T)/(pi f T), which `parameters` has put into the amplitudes together with the
 sensor's bandwidth. What is left beyond half the rate aliases by itself: the phase advances by the exact turn of one
-period, as a precomputed rotation, so that no sine is left for the flight loop.
+period, as a precomputed rotation, and by the little that this flight's rotor turns faster than it is said to.
 """
 
 from typing import NamedTuple
@@ -58,23 +58,26 @@ class InertialParameters(NamedTuple):
     # the turn of each tone's phase in a period, and what amplitude is left of it in a reading
     rev_cosine: float
     rev_sine: float
+    rev_turn_rad: float
     rev_level_m_s2: float
     rev_vertical_m_s2: float
     rev_tilt_rad_s: float
     rev_yaw_rad_s: float
     blade_cosine: float
     blade_sine: float
+    blade_turn_rad: float
     blade_level_m_s2: float
     blade_vertical_m_s2: float
     blade_tilt_rad_s: float
     blade_yaw_rad_s: float
     vibration_spread: float  # from flight to flight, a share
+    vibration_speed_spread: float  # of the rotor's speed, a share
 
 
 class InertialUnit(NamedTuple):
     """What this very unit is, constant in flight: E, G and E' row by row (gyro_xy: of w_y in the x reading).
 
-    The last field is how strong this flight's vibration is, against the datasheet's.
+    vibration: how strong this flight's is, against the datasheet's; faster: the share by which its rotor turns faster.
     """
 
     gyro_xx: float
@@ -105,6 +108,7 @@ class InertialUnit(NamedTuple):
     accel_zy: float
     accel_zz: float
     vibration: float
+    faster: float
 
 
 class InertialState(NamedTuple):
@@ -183,7 +187,7 @@ def draw_inertial(n: InertialUnit, p: InertialParameters) -> InertialUnit:
         stretch * n.accel_xx, turn * n.accel_xy, turn * n.accel_xz,
         turn * n.accel_yx, stretch * n.accel_yy, turn * n.accel_yz,
         turn * n.accel_zx, turn * n.accel_zy, stretch * n.accel_zz,
-        factor(p.vibration_spread, n.vibration),
+        factor(p.vibration_spread, n.vibration), p.vibration_speed_spread * n.faster,
     )  # fmt: skip
 
 
@@ -214,8 +218,19 @@ def start_inertial(n: InertialStartNormals, p: InertialParameters) -> InertialSt
 
 
 @equation
-def _next_state(state: InertialState, n: InertialNormals, p: InertialParameters) -> InertialState:
+def _turned(cosine: float, sine: float, by: tuple[float, float], further_rad: float) -> tuple[float, float]:
+    """A phase turned by an angle, given by its cosine and sine, and by a small one more (to its fourth order)."""
+    square = further_rad * further_rad
+    near, off = 1.0 - square * (0.5 - square / 24.0), further_rad * (1.0 - square / 6.0)
+    c, s = by[0] * near - by[1] * off, by[1] * near + by[0] * off
+    return c * cosine - s * sine, s * cosine + c * sine
+
+
+@equation
+def _next_state(state: InertialState, faster: float, n: InertialNormals, p: InertialParameters) -> InertialState:
     """Biases walked and phases turned by one period."""
+    rev = _turned(state.rev_cosine, state.rev_sine, (p.rev_cosine, p.rev_sine), faster * p.rev_turn_rad)
+    blade = _turned(state.blade_cosine, state.blade_sine, (p.blade_cosine, p.blade_sine), faster * p.blade_turn_rad)
     return InertialState(
         gyro_bias_x=state.gyro_bias_x + p.gyro_walk_rad_s * n.gyro_bias_x,
         gyro_bias_y=state.gyro_bias_y + p.gyro_walk_rad_s * n.gyro_bias_y,
@@ -223,10 +238,10 @@ def _next_state(state: InertialState, n: InertialNormals, p: InertialParameters)
         accel_bias_x=state.accel_bias_x + p.accel_walk_m_s2 * n.accel_bias_x,
         accel_bias_y=state.accel_bias_y + p.accel_walk_m_s2 * n.accel_bias_y,
         accel_bias_z=state.accel_bias_z + p.accel_walk_m_s2 * n.accel_bias_z,
-        rev_cosine=p.rev_cosine * state.rev_cosine - p.rev_sine * state.rev_sine,
-        rev_sine=p.rev_sine * state.rev_cosine + p.rev_cosine * state.rev_sine,
-        blade_cosine=p.blade_cosine * state.blade_cosine - p.blade_sine * state.blade_sine,
-        blade_sine=p.blade_sine * state.blade_cosine + p.blade_cosine * state.blade_sine,
+        rev_cosine=rev[0],
+        rev_sine=rev[1],
+        blade_cosine=blade[0],
+        blade_sine=blade[1],
     )
 
 
@@ -241,7 +256,7 @@ def step_inertial(
     state: InertialState, unit: InertialUnit, truth: ImuReading, n: InertialNormals, p: InertialParameters
 ) -> tuple[InertialState, InertialReading]:
     """The reading of one period, whose mean rate and mean specific force are `truth`."""
-    s, u = _next_state(state, n, p), unit
+    s, u = _next_state(state, unit.faster, n, p), unit
     wx, wy, wz = truth.gyro_x_rad_s, truth.gyro_y_rad_s, truth.gyro_z_rad_s
     fx, fy, fz = truth.accel_x_m_s2, truth.accel_y_m_s2, truth.accel_z_m_s2
     gyro_x = wx + (

@@ -55,9 +55,12 @@ class Tone(ParameterModel):
 
 
 class Vibration(ParameterModel):
-    """Tones at the rotor's and at the blades' frequency; `spread` is the share by which flights differ."""
+    """Tones at the rotor's and at the blades' frequency; the spreads are shares by which flights differ."""
 
     spread: Number = Field(0.0, ge=0.0, le=2.0)  # share by which flights differ in all amplitudes; 0: alike
+    speed_spread: Number = Field(
+        0.0, ge=0.0, le=0.1
+    )  # share by which the rotor turns faster or slower than it is said to
     rotor: Tone = Tone()
     blades: Tone = Tone()
 
@@ -102,7 +105,8 @@ class InertialSheet(SensorSheet):
         tone = self.vibration.rotor if name == "rev" else self.vibration.blades
         left, turn = self.left_of_tone(speed_rad_s / (2.0 * math.pi)), speed_rad_s * self.period_s
         amplitudes = {key: left * amplitude for key, amplitude in in_si(tone, f"{name}_").items()}
-        return {f"{name}_cosine": math.cos(turn), f"{name}_sine": math.sin(turn), **amplitudes}
+        phase = {f"{name}_cosine": math.cos(turn), f"{name}_sine": math.sin(turn), f"{name}_turn_rad": turn}
+        return phase | amplitudes
 
 
 class PositionErrors(ParameterModel):

@@ -94,7 +94,8 @@ def every_nth(p: InertialParameters, n: int) -> InertialParameters:
     rev, blade = (complex(c, s) ** n for c, s in ((p.rev_cosine, p.rev_sine), (p.blade_cosine, p.blade_sine)))
     return p._replace(
         gyro_walk_rad_s=p.gyro_walk_rad_s * math.sqrt(n), accel_walk_m_s2=p.accel_walk_m_s2 * math.sqrt(n),
-        rev_cosine=rev.real, rev_sine=rev.imag, blade_cosine=blade.real, blade_sine=blade.imag,
+        rev_cosine=rev.real, rev_sine=rev.imag, rev_turn_rad=n * p.rev_turn_rad,
+        blade_cosine=blade.real, blade_sine=blade.imag, blade_turn_rad=n * p.blade_turn_rad,
     )  # fmt: skip
 
 

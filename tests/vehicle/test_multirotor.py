@@ -131,7 +131,7 @@ def test_the_mixer_gives_what_is_asked_where_it_fits():
     assert shares == pytest.approx(0.4 + 0.02 * places[:, 0] + 0.03 * places[:, 1] + 0.01 * sense)
 
 
-def test_axial_damping_and_translational_lift_are_momentum_theory_s():
+def test_axial_damping_translational_lift_and_their_torque_are_momentum_theory_s():
     blade = {"a": 5.0, "chord": 0.020, "radius": 0.127}
     speed, rho = hover_speed(QUAD), 1.225
     slope = rho * blade["a"] * 2 * blade["chord"] * blade["radius"] ** 2 / 4.0 * speed
@@ -143,11 +143,18 @@ def test_axial_damping_and_translational_lift_are_momentum_theory_s():
     def thrust(inplane, axial):
         free = at_rest + axial + pitch * inplane**2 / (blade["radius"] * speed)
         v = brentq(lambda v: disc * v * math.hypot(inplane, v - axial) - slope * (free - v), 0.0, free)
-        return slope * (free - v)
+        return slope * (free - v), (v - axial) / speed
 
+    hover_torque = propeller_load(speed, 0.0, 0.0, 0.0, HIGH_M, QUAD).torque_n_m
+    still_n, still_arm = thrust(0.0, 0.0)
+    for inplane, axial in ((0.0, 1.0), (0.0, -1.0), (2.0, 0.0), (4.0, 0.0), (8.0, 0.0)):
+        torque_n_m = propeller_load(speed, inplane**2, axial, 0.0, HIGH_M, QUAD).torque_n_m
+        pushed_n, arm = thrust(inplane, axial)
+        asked = pushed_n * arm - still_n * still_arm
+        assert torque_n_m - hover_torque == pytest.approx(asked, rel=0.2, abs=0.006 * hover_torque), (inplane, axial)
     for inplane, axial in ((0.0, 0.5), (0.0, -0.5), (2.0, 0.0), (4.0, 0.0), (8.0, 0.0), (3.0, -0.5)):
         ours = propeller_load(speed, inplane**2, axial, 0.0, HIGH_M, QUAD).thrust_n
-        assert ours == pytest.approx(thrust(inplane, axial), rel=0.03), (inplane, axial)
+        assert ours == pytest.approx(thrust(inplane, axial)[0], rel=0.03), (inplane, axial)
     held = propeller_load(speed, 0.0, 0.1, 0.0, HIGH_M, with_inflow_held(QUAD)).thrust_n - hover
     assert held == pytest.approx(slope * 0.1, rel=1e-6)
 
@@ -165,7 +172,8 @@ def test_a_propellers_three_quotients_are_those_of_its_formulas(speed, inplane_s
         QUAD.inplane_drag_n_s2_m_rad * speed + near_ground * free * tilt, rel=1e-9, abs=1e-9
     )
     assert load.hub_n_s == pytest.approx(QUAD.hub_stiffness_n_m_rad * tilt, rel=1e-9)
-    assert load.torque_n_m == pytest.approx(QUAD.torque_n_m_s2 * speed**2)
+    changed = QUAD.torque_of_thrust_m * (free - QUAD.thrust_n_s2 * speed**2)
+    assert load.torque_n_m == pytest.approx(QUAD.torque_n_m_s2 * speed**2 + changed, rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize(("ratio", "expected"), [(0.5, 4.0 / 3.0), (1.0, 16.0 / 15.0), (2.0, 64.0 / 63.0)])

@@ -119,6 +119,13 @@ def speed_rate(speed: float, told: float, vehicle: MultirotorParameters) -> floa
     return vehicle.motor_rate_1_s * (told - speed)
 
 
+@equation
+def torque_of(speed: float, thrust_n: float, vehicle: MultirotorParameters) -> float:
+    """Torque of the air on a rotor [N m]; thrust_n: in free air, by which it differs from a hover at this speed."""
+    hover_n = vehicle.thrust_n_s2 * speed * speed
+    return vehicle.torque_n_m_s2 * speed * speed + vehicle.torque_of_thrust_m * (thrust_n - hover_n)
+
+
 STILL_SQ = 1e-9  # [m2/s2] keeps a rotor at rest in dead air from dividing by zero
 
 
@@ -154,6 +161,8 @@ def propeller_load(
 ) -> PropellerLoad:  # fmt: skip
     """One propeller at a height of its hub above the ground [m], horizontal airspeed squared [m2/s2].
 
+    Its torque is that of its speed in hover, and what climb and translational lift change; Cheeseman and Bennett's
+    thrust in the ground's effect is that of a rotor of the same power.
     Divisions are most of what a rotor costs on lanes: one serves lift, ground and flapping.
     """
     lift, by_lift = lifting(speed, inplane_sq, vehicle)
@@ -161,11 +170,12 @@ def propeller_load(
     by_ground, by_tilt = free - image, vehicle.radius_m * vehicle.radius_m * larger(speed, 1.0)
     per_all = 1.0 / (by_lift * by_ground * by_tilt)
     lifted = lift * (by_ground * by_tilt * per_all)
-    thrust = free * (by_lift * by_tilt * per_all) * (level_thrust(speed, axial, vehicle) + lifted)
+    above_ground = level_thrust(speed, axial, vehicle) + lifted
+    thrust = free * (by_lift * by_tilt * per_all) * above_ground
     tilt = vehicle.flap_back_m * (by_lift * by_ground * per_all)  # [rad/(m/s)]
     return PropellerLoad(
         thrust,
         vehicle.inplane_drag_n_s2_m_rad * speed + thrust * tilt,
         vehicle.hub_stiffness_n_m_rad * tilt,
-        vehicle.torque_n_m_s2 * speed * speed,
+        torque_of(speed, above_ground, vehicle),
     )

@@ -178,7 +178,8 @@ class MultirotorParameters(NamedTuple):
     Of each propeller at a speed Ω: `thrust` k_T, T = k_T·Ω² in still air; `torque` k_Q likewise; `axial` dT/dw = this·Ω
     per velocity against the thrust; `inplane` dT/dV² for slow V, the translational lift; `hover_inflow` v_i = this·Ω.
     The last three are momentum theory and blade elements about the propeller's own hover: T = S·(Θ - v_i + w),
-    v_i·√(V² + (v_i - w)²) = T/2ρA, S = ρ·a·b·c·R²·Ω/4, all of which scale with Ω.
+    v_i·√(V² + (v_i - w)²) = T/2ρA, S = ρ·a·b·c·R²·Ω/4, all of which scale with Ω. The air that passes the disc takes
+    the power T·(v_i - w), so a thrust that is larger by dT takes `torque_of_thrust`·dT, to first order.
     """
 
     gravity_m_s2: float
@@ -207,6 +208,7 @@ class MultirotorParameters(NamedTuple):
     radius_m: float
     thrust_n_s2: float
     torque_n_m_s2: float
+    torque_of_thrust_m: float
     axial_n_s2_m: float
     axial_held_n_s2_m: float  # the same while v_i keeps its value
     inplane_n_s2_m2: float
@@ -263,6 +265,7 @@ def flatten_multirotor(file: MultirotorFile) -> MultirotorParameters:
         per_arm_1_m=1.0 / frame.arm_m,
         thrust_n_s2=thrust,
         torque_n_m_s2=torque,
+        torque_of_thrust_m=inflow - thrust / slope,
         axial_n_s2_m=0.5 * slope / (1.0 + slope / (4.0 * disc * inflow)),
         axial_held_n_s2_m=slope,
         inplane_n_s2_m2=slope / (4.0 * inflow + slope / disc) + slope * pitch / radius,

@@ -57,9 +57,9 @@ SEED = 5
 SETTLED = 500  # epochs
 # m/s (docs/explanation/landing-filter.md): sixteen gusty landings, at the horizon and flown on, with delay or states
 IN_LANDINGS = {
-    "2 Hz, damping 0.7": ((0.0282, 0.0307), (0.0298, 0.0331)),
-    "2 Hz, damping 1.5": ((0.0312, 0.0312), (0.0305, 0.0339)),
-    "0.5 Hz, damping 0.7": ((0.0356, 0.0405), (0.0316, 0.0349)),
+    "2 Hz, damping 0.7": ((0.0214, 0.0234), (0.0216, 0.0235)),
+    "2 Hz, damping 1.5": ((0.0230, 0.0323), (0.0227, 0.0246)),
+    "0.5 Hz, damping 0.7": ((0.0306, 0.0435), (0.0237, 0.0257)),
 }
 SENSORS = {"2 Hz, damping 0.7": (2.0, 0.7), "2 Hz, damping 1.5": (2.0, 1.5), "0.5 Hz, damping 0.7": (0.5, 0.7)}
 

@@ -109,7 +109,7 @@ def test_the_lag_is_that_of_the_flying_sensor(path):
 def test_one_reading_of_three_is_three_steps_on():
     p = InertialSheet.read().parameters(600.0, 2.0)._replace(gyro_sigma_rad_s=0.0, accel_sigma_m_s2=0.0)
     quiet, truth = inertial.InertialNormals(*[0.0] * 12), ImuReading(0.1, 0.2, 0.3, 1.0, 2.0, -9.8)
-    unit = inertial.InertialUnit(*[0.0] * 27, 1.0)
+    unit = inertial.InertialUnit(*[0.0] * 27, 1.0, 0.0)
     begun = inertial.start_inertial(inertial.InertialStartNormals(*[0.3] * 10), p)
     state = begun
     for _ in range(3):

@@ -13,9 +13,7 @@ flights, where the shipped sheet leaves 0.01: docs/explanation/validation.md).
 import math
 from typing import NamedTuple
 
-import numpy as np
-
-from flownav.core.compile import clamp, equation
+from flownav.core.compile import clamp, cos, equation, exp, sin
 from flownav.navigation.motion_records import ToneMemory
 from flownav.navigation.told import ImuSettings
 
@@ -59,7 +57,7 @@ class Freed(NamedTuple):
 def turn_of(tone_hz: float, dt_s: float) -> Turn:
     """A tone of 0 Hz is none: it takes nothing."""
     angle = 2.0 * math.pi * tone_hz * dt_s
-    return Turn(np.cos(angle), np.sin(angle), 1.0 - np.exp(-angle / WIDTH))
+    return Turn(cos(angle), sin(angle), 1.0 - exp(-angle / WIDTH))
 
 
 @equation

@@ -58,9 +58,7 @@ class Vibration(ParameterModel):
     """Tones at the rotor's and at the blades' frequency; the spreads are shares by which flights differ."""
 
     spread: Number = Field(0.0, ge=0.0, le=2.0)  # share by which flights differ in all amplitudes; 0: alike
-    speed_spread: Number = Field(
-        0.0, ge=0.0, le=0.1
-    )  # share by which the rotor turns faster or slower than it is said to
+    speed_spread: Number = Field(0.0, ge=0.0, le=0.1)  # share by which rotors are not as fast as they are said to be
     rotor: Tone = Tone()
     blades: Tone = Tone()
 

@@ -21,6 +21,8 @@ CONFIDENCE = 0.95
 LARGEST_CV = 0.3
 PILOT_FLIGHTS = 512  # a level
 ISLANDS, ISLAND_FLIGHTS = 8, 512  # a level: 512 walks side by side, and seven degrees of freedom for the interval
+# without it 94, 93 and 87 % of 400 intervals of 95 % hold a truth of 1e-3, 1e-4 and 1e-6 (test_rare_estimator's stand-in)
+WIDER_A_LEVEL = 0.07
 DIRECT_FLIGHTS = 4096  # at once, where there are no levels to climb
 FAR = 3.7  # -ln((1 - CONFIDENCE) / 2): none of n flights shows that the probability is below FAR / n
 NEGLIGIBLE, SMALL = 0.02, 0.1  # of the event's other part: not worth flights, or not worth more of them
@@ -83,15 +85,19 @@ def found_on(ladder: walk.Ladder, lots: list[walk.Islands], count: int) -> Found
         return Found(0.0, 0.0, FAR / (islands * count), np.inf, np.inf, levels, beyond.at(np.arange(0)), np.zeros(0))
     cv = float(estimates.std(ddof=1)) / mean / np.sqrt(islands)
     own = [lot.estimates[lot.island] / np.bincount(lot.island)[lot.island] for lot in lots]
-    low, high = interval_of(mean, cv, islands - 1)
+    low, high = interval_of(mean, cv, islands - 1, len(levels))
     return Found(mean, low, high, cv, islands - 1, levels, beyond, np.concatenate(own) / islands)
 
 
-def interval_of(mean: float, cv: float, freedom: float) -> tuple[float, float]:
-    """The interval of a mean whose logarithm is nearly normal, as that of a product of many shares is: Student's t."""
+def interval_of(mean: float, cv: float, freedom: float, levels: int) -> tuple[float, float]:
+    """The interval of a mean whose logarithm is nearly normal, as that of a product of many shares is: Student's t.
+
+    Islands that miss the same few flights agree, the more so the more levels they climbed: WIDER_A_LEVEL.
+    """
     from scipy.stats import t
 
-    factor = float(np.exp(t.ppf(0.5 + 0.5 * CONFIDENCE, freedom) * np.sqrt(np.log1p(cv * cv))))
+    wider = 1.0 + WIDER_A_LEVEL * levels
+    factor = float(np.exp(wider * t.ppf(0.5 + 0.5 * CONFIDENCE, freedom) * np.sqrt(np.log1p(cv * cv))))
     return mean / factor, min(mean * factor, 1.0)
 
 
@@ -126,7 +132,7 @@ def together_with(parts: list[Found]) -> tuple[float, float, float, float]:
         low, high = known[0].low, known[0].high
     else:  # Welch and Satterthwaite's degrees of freedom
         freedom = variance**2 / max(float((variances**2 / [part.freedom for part in known]).sum()), 1e-300)
-        low, high = interval_of(total, cv, freedom)
+        low, high = interval_of(total, cv, freedom, max(len(part.levels) for part in known))
     return total, low, min(high + unseen, 1.0), cv
 
 

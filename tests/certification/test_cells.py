@@ -47,6 +47,22 @@ def test_flights_are_judged_by_what_they_were_flown_for(tmp_path):
         require_planned(softer, folder)
 
 
+def test_a_plan_of_more_flights_or_of_something_softer_shares_no_flight(tmp_path):
+    """In another folder, with the same seed: who adds flights to those that were seen draws all of them anew."""
+    drawn = [
+        set(plan.ready(0).ensemble.values(plan.seed, 0, 40)["wind.speed_20ft_m_s"])
+        for plan in (
+            planned(tmp_path, HEAD + WINDY + ASKED, 40),
+            planned(tmp_path, HEAD + WINDY + ASKED, 41),
+            planned(tmp_path, HEAD + WINDY + ASKED.replace("0.5", "2.0"), 40),
+            planned(tmp_path, "seed = 2\n" + HEAD + WINDY + ASKED, 40),
+        )
+    ]
+    assert all(not one & other for k, one in enumerate(drawn) for other in drawn[:k])
+    again = planned(tmp_path, HEAD + WINDY + ASKED, 40)
+    assert drawn[0] == set(again.ready(0).ensemble.values(again.seed, 0, 40)["wind.speed_20ft_m_s"])
+
+
 def test_a_range_that_cannot_be_is_refused_before_anything_is_flown(tmp_path):
     with pytest.raises(InputError, match="speed_20ft_m_s"):
         planned(tmp_path, HEAD + "[conditions]\nwind.speed_20ft_m_s = [-5, 5]\n" + ASKED)

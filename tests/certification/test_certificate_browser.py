@@ -16,11 +16,11 @@ pytestmark = pytest.mark.browser
 CRASH = '[[requirement]]\nmeasure = "crash"\nat_most = 0\nprobability = 0.9\n'
 
 
-def far_in_wind(cell, first, flights):
-    """Up to 0.6 m from the pad's centre, the further the more wind there is."""
+def far_in_wind(cell, seed, first, flights):
+    """Up to 0.8 m from the pad's centre, the further the more wind there is."""
     import numpy as np
 
-    return 0.07 * np.array(cell.ensemble.values(1, first, flights)["wind.speed_20ft_m_s"])
+    return 0.1 * np.array(cell.ensemble.values(seed, first, flights)["wind.speed_20ft_m_s"])
 
 
 @pytest.fixture(scope="module")

@@ -76,9 +76,9 @@ def certified(tmp_path, text, engine, flights=None, rows=0, folder="out"):
         return certificate, write_certificate(certificate, store, path, 2 if isinstance(engine, Local) else 0)
 
 
-def in_strong_wind(cell, first, flights):
+def in_strong_wind(cell, seed, first, flights):
     """Touches 1 m off where the wind is above 6 m/s, else in the middle."""
-    speed = np.array(cell.ensemble.values(1, first, flights)["wind.speed_20ft_m_s"])
+    speed = np.array(cell.ensemble.values(seed, first, flights)["wind.speed_20ft_m_s"])
     return np.where(speed > 6.0, 1.0, 0.01 * speed)
 
 
@@ -140,9 +140,9 @@ def test_a_verdict_is_of_all_requirements_and_a_flight_fails_if_it_fails_one(tmp
 
 
 def test_cells_are_judged_by_themselves_and_inputs_ranked_in_the_worst(tmp_path):
-    def higher_is_worse(cell, first, flights):
+    def higher_is_worse(cell, seed, first, flights):
         return np.full(flights, 1.0 if cell.setup.scenario.flight.path[0].height_m > 3.5 else 0.0) + in_strong_wind(
-            cell, first, flights
+            cell, seed, first, flights
         )
 
     engine = StandIn(higher_is_worse)
@@ -157,7 +157,7 @@ def test_cells_are_judged_by_themselves_and_inputs_ranked_in_the_worst(tmp_path)
 
 
 def test_flights_that_are_all_alike_leave_nothing_to_rank(tmp_path):
-    _, facts = certified(tmp_path, HEAD + WINDY + ASKED, StandIn(lambda cell, first, n: np.zeros(n)), rows=16)
+    _, facts = certified(tmp_path, HEAD + WINDY + ASKED, StandIn(lambda cell, seed, first, n: np.zeros(n)), rows=16)
     assert (facts["verdict"], facts["ranking_of"]) == ("pass", "nothing")
     page = (tmp_path / "out" / "certificate.html").read_text(encoding="utf-8")
     assert "have the same outcome: there is nothing to rank." in page

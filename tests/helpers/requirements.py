@@ -36,9 +36,9 @@ def rows_touching(distance_m: np.ndarray, crashed: np.ndarray | None = None) -> 
 
 
 class StandIn:
-    """An engine whose flights are numbers: outcome(cell, first, flights) gives how far each touches from the pad."""
+    """An engine whose flights are numbers: outcome(cell, seed, first, flights), how far off the pad each touches."""
 
-    def __init__(self, outcome: Callable[[Ready, int, int], np.ndarray]) -> None:
+    def __init__(self, outcome: Callable[[Ready, int, int, int], np.ndarray]) -> None:
         self.outcome, self.flown = outcome, 0
 
     def fly(
@@ -48,4 +48,4 @@ class StandIn:
         for part in parts:
             self.flown += part.flights
             on_progress(part.flights)
-            yield part, rows_touching(self.outcome(cell, part.first, part.flights))
+            yield part, rows_touching(self.outcome(cell, seed, part.first, part.flights))

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
@@ -49,6 +50,9 @@ class SensorFailure:
 def plan_of(requirement: Requirement, flights: int | None = None, vehicle: str | None = None) -> Plan:
     """The campaign of a requirement, each flight with a number of its own, so that all are independent.
 
+    Its seed is of the requirement's, of how many are flown and of what is asked (`seed_of`): a plan of more flights
+    shares none with one of fewer, so that none are added to flights that can be seen, in whatever folder.
+
     flights: how many at least; as many as the requirement needs where it is None. As many are flown in each cell.
     InputError as `cells_of`.
     """
@@ -56,7 +60,13 @@ def plan_of(requirement: Requirement, flights: int | None = None, vehicle: str |
     each = -(-(flights or requirement.flights()) // len(cells))
     asked = tuple(table.sentence() for table in requirement.requirement)
     own = tuple(replace(cell, first=k * each) for k, cell in enumerate(cells))
-    return Plan(own, requirement.seed, each, asked=asked)
+    return Plan(own, seed_of(requirement.seed, each, asked), each, asked=asked)
+
+
+def seed_of(seed: int, each: int, asked: tuple[str, ...]) -> int:
+    """A campaign's seed, 31 bits of the SHA-256 of the requirement's seed, the flights a cell and what is asked."""
+    told = "\n".join([str(seed), str(each), *asked])
+    return int.from_bytes(sha256(told.encode()).digest()[:4], "big") >> 1
 
 
 def require_planned(plan: Plan, folder: Path) -> None:
@@ -69,12 +79,12 @@ def require_planned(plan: Plan, folder: Path) -> None:
     if asked is not None and list(asked) != list(plan.asked):
         raise InputError(
             f"{folder}: was flown for {'; '.join(map(str, asked))}; to judge its flights by something else takes more "
-            "risk than is stated: give another folder, and another seed in the requirement"
+            "risk than is stated: give another folder, whose flights will be others"
         )
     if planned != plan.flights:
         raise InputError(
             f"{folder}: was planned with {planned} flights a cell, not {plan.flights}; to add flights until they pass "
-            "takes more risk than is stated: give another folder, and another seed in the requirement"
+            "takes more risk than is stated: give another folder, whose flights will be others"
         )
 
 

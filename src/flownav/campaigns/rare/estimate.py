@@ -21,7 +21,7 @@ CONFIDENCE = 0.95
 LARGEST_CV = 0.3
 PILOT_FLIGHTS = 512  # a level
 ISLANDS, ISLAND_FLIGHTS = 8, 512  # a level: 512 walks side by side, and seven degrees of freedom for the interval
-# without it 94, 93 and 87 % of 400 intervals of 95 % hold a truth of 1e-3, 1e-4 and 1e-6 (test_rare_estimator's stand-in)
+# without it 94, 93 and 87 % of 400 intervals of 95 % hold a truth of 1e-3, 1e-4 and 1e-6 (rare-events.md)
 WIDER_A_LEVEL = 0.07
 DIRECT_FLIGHTS = 4096  # at once, where there are no levels to climb
 FAR = 3.7  # -ln((1 - CONFIDENCE) / 2): none of n flights shows that the probability is below FAR / n

@@ -31,6 +31,9 @@ NOTCHED = ("level_m_s2", "vertical_m_s2")
 # what a unit that integrates leaves out of the position; with 0.01, the default, w errs by 0.7 of what is stated at
 # `approach`, with this by 1.0
 INTEGRATED_M_RT_S = 0.002
+# of a rangefinder's error of scale, what counts as noise; it lasts, and over one ground it is the ground's height. With
+# all of it w errs by 0.5 of what is stated in a hover (`takeoff`), with none z by 1.26 (`landing`)
+SCALE_SHARE = 0.5
 FOLLOWED_TO = 0.002  # a notch follows its tone within this (test_notch), whatever the rotor does
 LAGS_AS_STATED = 2.0  # of a receiver's filter: 0.2 to 0.3 s were found in two logs where sheets say 0.1 s (validate)
 WASH_LASTS_S = 3.0  # chosen, not measured: how long a rotor's wash deceives a barometer
@@ -265,12 +268,12 @@ def of_pad_camera(sheet: PadCameraSheet) -> Keys:
 
 # -- height and heading --------------------------------------------------------------------------------------
 def of_range_sensor(sheet: RangeSensorSheet) -> Keys:
-    """Noise, steps, offset and scale; its limits, the floor excepted, which is what nearer ground reads too."""
+    """Noise, steps, offset, scale; its limits, the floor excepted, which is what nearer ground reads too."""
     return {
         "range_sigma_m": max(
             math.hypot(sheet.sigma_m, sheet.resolution_m / math.sqrt(12.0), sheet.offset_sigma_m), 1e-3
         ),
-        "range_relative_sigma": 0.01 * math.hypot(sheet.sigma_percent, sheet.scale_percent),
+        "range_relative_sigma": 0.01 * math.hypot(sheet.sigma_percent, SCALE_SHARE * sheet.scale_percent),
         "range_min_m": sheet.floor_m + ABOVE_FLOOR_M,
         "range_max_m": sheet.ceiling_m,
         "range_forward_m": sheet.lens.forward_m,

@@ -26,6 +26,7 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from flownav.core.measurement import Array
 from flownav.core.parameter_files import Number, ParameterModel, load, shipped
+from flownav.simulation.inverses import inverse_of
 from flownav.simulation.noise import threefry
 
 Known = Literal["build", "day", "never"]
@@ -65,8 +66,13 @@ class Distribution(ParameterModel):
         return dict(self.model_extra or {})
 
     def frozen(self) -> Any:
-        """SciPy's distribution with these parameters. ValueError where there is none such."""
-        from scipy import stats
+        """The distribution with these parameters, SciPy's or one that stands for it (`ppf`, `support`).
+
+        ValueError where there is none such.
+        """
+        if known := inverse_of(self.distribution, self.shapes, self.loc, self.scale):
+            return known
+        from scipy import stats  # not without need: it takes 46 MB
 
         family = getattr(stats, self.distribution, None)
         if not isinstance(family, stats.rv_continuous):

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.special import log1p, log_ndtr, logsumexp, ndtr, ndtri, ndtri_exp
+from scipy.special import betaincinv, log1p, log_ndtr, logsumexp, ndtr, ndtri, ndtri_exp
 
 from flownav.core.measurement import Array
 
@@ -57,6 +57,9 @@ FAMILIES: Mapping[str, Family] = {
     "loguniform": Family(
         ("a", "b"), lambda a, b: 0.0 < a < b, lambda a, b: (a, b),
         lambda q, a, b: np.exp(np.log(a) + q * (np.log(b) - np.log(a))),
+    ),
+    "beta": Family(
+        ("a", "b"), lambda a, b: a > 0.0 and b > 0.0, lambda a, b: (0.0, 1.0), lambda q, a, b: betaincinv(a, b, q)
     ),
     "truncnorm": Family(("a", "b"), lambda a, b: a < 0.0 < b, lambda a, b: (a, b), _truncated),
 }  # fmt: skip

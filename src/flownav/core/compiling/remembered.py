@@ -97,7 +97,7 @@ def _renamed(states: Any, block: Any, handler: Any) -> Iterator[Any]:
 
 
 def _hash_of_type(self: Any) -> int:
-    """The hash of a type, which Numba computes anew from all its parts; of what is not the type itself it is not kept."""
+    """The hash of a type, which Numba computes anew from all its parts; that of a mere copy is not kept."""
     known = _hashes.get(id(self))
     if known is not None:
         return known[0]

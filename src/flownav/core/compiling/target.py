@@ -39,7 +39,7 @@ from flownav.core.compiling.remembered import remembering
 
 COLLECT_AFTER = 50_000  # objects; Python's own 700 costs a tenth of the time of a compilation
 ENVIRONMENT_SYMBOL = "_ZN08NumbaEnv"
-ONE_LANE_MARKS = "UniTupleIxLi1EE", "UniTuple_28int64_20x_201_29"  # `ONE_LANE` in the name of a function, and in a record
+ONE_LANE_MARKS = "UniTupleIxLi1EE", "UniTuple_28int64_20x_201_29"  # `ONE_LANE` in a function's name, in a record's
 
 # A lane loop must reach the vectoriser as a loop. Left alone, LLVM fully unrolls one whose body is still a
 # call (equations are inlined later) and the lanes come out scalar; loops of 8 and fewer may unroll.

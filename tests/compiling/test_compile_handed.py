@@ -8,8 +8,8 @@ import numba
 import numpy as np
 import pytest
 from llvmlite import ir
-from numba.core.datamodel.registry import default_manager
 from numba.core.datamodel.manager import DataModelManager
+from numba.core.datamodel.registry import default_manager
 
 from flownav.core.compile import LANES, ONE_LANE, equation, kernel, procedure
 from flownav.core.compiling.remembered import remembering

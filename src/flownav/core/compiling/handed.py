@@ -9,8 +9,8 @@ that Numba compiles by itself; tuples of other packages, whose code may lie in a
 from typing import Any
 
 from numba import types
-from numba.core.datamodel.registry import default_manager
 from numba.core.datamodel.models import TupleModel, UniTupleModel
+from numba.core.datamodel.registry import default_manager
 
 OURS = "flownav."
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from browsing import CHROMIUM, QUIET, SOFTWARE_GL, Visit
+from browsing import CHROMIUM, QUIET, Visit
 from flownav.campaigns.certification.cells import plan_of
 from flownav.campaigns.certification.certify import certify, with_ranking
 from flownav.campaigns.certification.written import write_certificate
@@ -29,7 +29,7 @@ def browser():
         pytest.skip("no Chromium here: install Debian's package `chromium` (apt-get install chromium)")
     api = pytest.importorskip("playwright.sync_api", reason="install `playwright` (dependency group `test`)")
     with api.sync_playwright() as running:
-        opened = running.chromium.launch(executable_path=CHROMIUM, args=QUIET + SOFTWARE_GL)
+        opened = running.chromium.launch(executable_path=CHROMIUM, args=QUIET)
         yield opened
         opened.close()
 

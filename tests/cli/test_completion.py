@@ -1,4 +1,7 @@
-"""Shells complete values too: asked as bash asks, through the completion that `--install-completion` installs."""
+"""Shells complete values too: asked as bash asks, through the completion that `--install-completion` installs.
+
+One test asks a process of its own, as a shell does; the others ask in this one.
+"""
 
 from __future__ import annotations
 
@@ -8,17 +11,30 @@ import sys
 
 import pytest
 
+from flownav.cli import main
 
-def completed(line: str, cwd) -> list[str]:
+
+def asked(line: str) -> dict[str, str]:
+    """What bash says in the environment when it asks for the end of a line."""
+    return {"_FLOWNAV_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(line.count(" "))}
+
+
+@pytest.fixture
+def completed(tmp_path, monkeypatch, capsys):
     """What bash would be offered at the end of a line."""
-    words = line.split(" ")
-    asked = {"_FLOWNAV_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
-    done = subprocess.run(
-        [sys.executable, "-m", "flownav"], capture_output=True, text=True, env={**os.environ, **asked}, cwd=cwd,
-        timeout=120, check=False,
-    )  # fmt: skip
-    assert done.stderr == ""
-    return done.stdout.split()
+
+    def offered(line: str) -> list[str]:
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "argv", ["flownav"])
+        for name, value in asked(line).items():
+            monkeypatch.setenv(name, value)
+        with pytest.raises(SystemExit):
+            main()
+        told = capsys.readouterr()
+        assert told.err == ""
+        return told.out.split()
+
+    return offered
 
 
 @pytest.mark.parametrize(("line", "offered"), [
@@ -42,14 +58,19 @@ def completed(line: str, cwd) -> list[str]:
     ("flownav rig --firmware 2013", ["2013-06", "2013-09"]),
     ("flownav schema file-se", ["file-sensor", "file-settings"]),
 ])  # fmt: skip
-def test_values_are_offered(tmp_path, line, offered):
-    assert completed(line, tmp_path) == offered
+def test_values_are_offered(completed, line, offered):
+    assert completed(line) == offered
 
 
 def test_files_are_offered_beside_the_names(tmp_path):
     (tmp_path / "windy.toml").touch()
     (tmp_path / "notes.txt").touch()
     (tmp_path / "sub").mkdir()
-    found = completed("flownav fly ", tmp_path)
+    done = subprocess.run(
+        [sys.executable, "-m", "flownav"], capture_output=True, text=True, env={**os.environ, **asked("flownav fly ")},
+        cwd=tmp_path, timeout=120, check=False,
+    )  # fmt: skip
+    assert done.stderr == ""
+    found = done.stdout.split()
     assert found[:6] == ["sortie", "takeoff", "landing", "gusty", "pad_return", "approach"]
     assert set(found[6:]) == {"windy.toml", "sub/"}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
 import time
 from pathlib import Path
@@ -17,19 +18,27 @@ from replay_logs import log_of_flight
 from ulog_files import ulog_of_flight
 
 
-@pytest.fixture
-def here(tmp_path, monkeypatch) -> Path:
-    """A folder of inputs, in which commands run."""
-    monkeypatch.chdir(tmp_path)
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("inputs")
     flown = log_of_flight(4.0)
-    flown.write(tmp_path / "log")
-    Path("x.ulg").write_bytes(ulog_of_flight(flown.tables).bytes())
-    Record({"kind": "fly"}).save(Path("x.fnr"))
-    Path("settings.toml").write_text("# flownav\nflow_gain_x = 1.0\n")
+    flown.write(folder / "log")
+    (folder / "x.ulg").write_bytes(ulog_of_flight(flown.tables).bytes())
+    Record({"kind": "fly"}).save(folder / "x.fnr")
+    (folder / "settings.toml").write_text("# flownav\nflow_gain_x = 1.0\n")
     for name in ("px4flow_paper.toml", "landing.toml", "quad_450.toml"):
-        Path(name).write_bytes(b"# flownav\n" + shipped(name).read_bytes())
-    Path("scenario.toml").write_text('flow_sensor = "px4flow_paper.toml"\n' + Path("landing.toml").read_text())
-    Path("key").write_text("0" * 64)
+        (folder / name).write_bytes(b"# flownav\n" + shipped(name).read_bytes())
+    scenario = 'flow_sensor = "px4flow_paper.toml"\n' + (folder / "landing.toml").read_text()
+    (folder / "scenario.toml").write_text(scenario)
+    (folder / "key").write_text("0" * 64)
+    return folder
+
+
+@pytest.fixture
+def here(inputs, tmp_path, monkeypatch) -> Path:
+    """A folder of inputs, in which commands run."""
+    shutil.copytree(inputs, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
     return tmp_path
 
 

@@ -61,7 +61,10 @@ BLOCK = 1000
 # -- every step and every law, lanes beside one lane -------------------------------------------------------------
 @kernel
 def every_step(buffer, lanes, settings, lag):  # type: ignore[no-untyped-def]
-    """A prediction, then each law once, some lanes without a reading; a sum of what scalars are read."""
+    """A prediction, then each law once, some lanes without a reading; a sum of what scalars are read.
+
+    One `fuse` for all laws: where each has its own, most of the suite's compiling is of this kernel.
+    """
     work = pointer(buffer)
     n = N
     for lane in range(len(lanes)):
@@ -70,43 +73,44 @@ def every_step(buffer, lanes, settings, lag):  # type: ignore[no-untyped-def]
     lag_starts(work, lanes, lag)
     predict(work, lanes, n, 0.02, settings)
     lag_ends(work, lanes, lag)
-    propagate_walks(work, lanes, 0.02, settings)
-    propagate_gauss_markov(work, lanes, n, 0.02, settings)
-    propagate_walks(work, lanes, 0.3, settings)
-    propagate_gauss_markov(work, lanes, n, 0.3, settings)
+    for seconds in (0.02, 0.3):
+        propagate_walks(work, lanes, seconds, settings)
+        propagate_gauss_markov(work, lanes, n, seconds, settings)
     for axis in range(3):
-        attitude(work, lanes, axis)
-        fuse(work, lanes, n, 3.0)
-        bridged_attitude(work, lanes, axis)
-        fuse(work, lanes, n, 3.0)
-        gps_position(work, lanes, axis, 0.1, 0.2, -0.3)
-        fuse(work, lanes, n, 3.0)
         gps_velocity(work, lanes, axis, forward_m=0.1, right_m=0.2, below_m=-0.3)
         expect(work, lanes, n, False)
         settle(work, lanes, n, 3.0)
-        body_velocity(work, lanes, axis, 0.1, 0.0, 0.2)
-        fuse(work, lanes, n, 3.0)
-        pad_fix(work, lanes, axis, 0.1)
-        fuse(work, lanes, n, 3.0)
-        position_itself(work, lanes, axis)
-        fuse(work, lanes, n, 3.0)
-        velocity_itself(work, lanes, axis)
-        fuse(work, lanes, n, 3.0)
-        gyro_at_rest(work, lanes, axis)
-        fuse(work, lanes, n, 3.0)
-        pad_below(work, lanes, axis)
-        fuse(work, lanes, n, 3.0)
-    for channel in range(2):
-        flow_rate(work, lanes, channel, 0.1, 0.0, 0.2, 0.15)
-        fuse(work, lanes, n, 3.0)
-        lagged_flow(work, lanes, channel, gain=196.9)
-        fuse(work, lanes, n, 3.0)
-    heading(work, lanes, 0)
-    fuse(work, lanes, n, 3.0)
-    range_along_boresight(work, lanes, 0, 0.1, right_m=0.05)
-    fuse(work, lanes, n, 3.0)
-    baro_altitude(work, lanes, 0)
-    fuse(work, lanes, n, 3.0)
+    for law in range(14):
+        for axis in range(3 if law < 9 else 2 if law < 11 else 1):
+            if law == 0:
+                attitude(work, lanes, axis)
+            elif law == 1:
+                bridged_attitude(work, lanes, axis)
+            elif law == 2:
+                gps_position(work, lanes, axis, 0.1, 0.2, -0.3)
+            elif law == 3:
+                body_velocity(work, lanes, axis, 0.1, 0.0, 0.2)
+            elif law == 4:
+                pad_fix(work, lanes, axis, 0.1)
+            elif law == 5:
+                position_itself(work, lanes, axis)
+            elif law == 6:
+                velocity_itself(work, lanes, axis)
+            elif law == 7:
+                gyro_at_rest(work, lanes, axis)
+            elif law == 8:
+                pad_below(work, lanes, axis)
+            elif law == 9:
+                flow_rate(work, lanes, axis, 0.1, 0.0, 0.2, 0.15)
+            elif law == 10:
+                lagged_flow(work, lanes, axis, gain=196.9)
+            elif law == 11:
+                heading(work, lanes, axis)
+            elif law == 12:
+                range_along_boresight(work, lanes, axis, 0.1, right_m=0.05)
+            else:
+                baro_altitude(work, lanes, axis)
+            fuse(work, lanes, n, 3.0)
     for lane in range(len(lanes)):
         if work[MEASURED * len(lanes) + lane] > 0.0:
             forget_lane(work, lanes, n, GROUND, lane, 1.0)

@@ -23,7 +23,7 @@ from flownav.simulation.scenario import Scenario, load_scenario
 SEED, FIRST = 5, 3
 # scenario, sections of its file, flights, whether each has a truth of its own
 SHORT: dict[str, tuple[str, dict[str, Any], int, bool]] = {
-    "paper": ("landing", {"filter": {"name": "paper"}, "flight": {"duration_s": 1.0}}, 3, False),
+    "paper": ("landing", {"filter": {"name": "paper"}, "flight": {"duration_s": 0.5}}, 3, False),
     "drawn": ("gusty", {"filter": {"name": "paper"}, "flight": {"duration_s": 0.4}}, 3, True),
     "navigator": ("landing", {"filter": {"handover_s": 0.2}, "flight": {"duration_s": 1.3}}, 2, False),
 }

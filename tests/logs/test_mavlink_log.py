@@ -354,7 +354,7 @@ CONTENT = flight_log(1.0).content
 PIECES = [b"\xfd", b"\xfe", b"\x00", b"\x01", b"\x1e\x00\x00", bytes(8), b"\xff" * 8, CONTENT[:90]]
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=75, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_any_damage_is_counted_or_refused_in_one_line(path, data):
     content = bytearray(CONTENT)
@@ -378,7 +378,7 @@ def test_any_damage_is_counted_or_refused_in_one_line(path, data):
         assert table is None or all(np.isfinite(column).all() for column in table.values())
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=75, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_any_payload_with_a_right_checksum_is_read_or_refused(path, data):
     log = flight_log(0.5)

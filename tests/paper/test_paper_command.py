@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,11 +15,12 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from browsing import CHROMIUM, QUIET, SOFTWARE_GL, Visit
+from browsing import CHROMIUM, QUIET, Visit
 from flownav.cli import paper as paper_command
 from flownav.core.errors import InputError, VerdictError
 from flownav.lab.rig.experiment import RigSettings, run_experiment
 from flownav.paper import findings, laboratory, published
+from flownav.paper.flights import Flights
 from flownav.paper.laboratory import Configuration
 from flownav.paper.page import panels
 from flownav.paper.published import HEIGHTS_M, ErrorRow
@@ -58,12 +60,27 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
 
 
 @pytest.fixture
-def short(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two quick runs a height in place of seven."""
-    settings = RigSettings(duration_s=5.0, runs=7)
-    quick = (Configuration("fixed", "short", settings), Configuration("other", "short", replace(settings, runs=1)))
-    monkeypatch.setattr(laboratory, "configurations", lambda seed: tuple(
-        replace(c, settings=replace(c.settings, seed=seed)) for c in quick))  # fmt: skip
+def short(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
+    """Quick runs, so many a height, beside one other configuration; with other instruments as quick."""
+    instrumented = laboratory.otherwise_instrumented
+
+    def quick(of: tuple[Configuration, ...], **other: int) -> tuple[Configuration, ...]:
+        return tuple(replace(one, settings=replace(one.settings, duration_s=5.0, **other)) for one in of)
+
+    def shortened(runs: int) -> None:
+        fixed, other = (
+            Configuration(name, "short", RigSettings(runs=k)) for name, k in (("fixed", runs), ("other", 1))
+        )
+        monkeypatch.setattr(laboratory, "configurations", lambda seed: quick((fixed, other), seed=seed))
+        monkeypatch.setattr(laboratory, "otherwise_instrumented", lambda seed: quick(instrumented(seed)))
+
+    return shortened
+
+
+@pytest.fixture(scope="module")
+def flown() -> Callable[[int], Flights]:
+    """Sixteen flights of a table."""
+    return cache(lambda table: reproduce((table,), 1, 16).flights[0])
 
 
 # -- the whole reproduction -------------------------------------------------------------------------------------
@@ -212,7 +229,7 @@ def browser() -> Iterator[Any]:
         pytest.skip("no Chromium here: install Debian's package `chromium` (apt-get install chromium)")
     api = pytest.importorskip("playwright.sync_api", reason="install `playwright` (dependency group `test`)")
     with api.sync_playwright() as running:
-        opened = running.chromium.launch(executable_path=CHROMIUM, args=QUIET + SOFTWARE_GL)
+        opened = running.chromium.launch(executable_path=CHROMIUM, args=QUIET)
         yield opened
         opened.close()
 
@@ -227,8 +244,8 @@ def test_one_table_of_flights_alone(tmp_path: Path) -> None:
     assert 'id="landing"' not in page
 
 
-@pytest.mark.usefixtures("short")
-def test_one_table_of_the_rig_alone_and_the_same_for_its_seed(tmp_path: Path) -> None:
+def test_one_table_of_the_rig_alone_and_the_same_for_its_seed(tmp_path: Path, short: Callable[[int], None]) -> None:
+    short(2)  # of which the second is the selected model's
     first, again, other = (run("--table", 3, "--seed", seed, page=tmp_path / f"{k}.html")
                            for k, seed in enumerate((1, 1, 2)))  # fmt: skip
     assert [key for key in first.facts if key.startswith("table")] == ["table3"]
@@ -237,10 +254,10 @@ def test_one_table_of_the_rig_alone_and_the_same_for_its_seed(tmp_path: Path) ->
     assert 'id="table2"' not in first.page.read_text(encoding="utf-8")
 
 
-@pytest.mark.usefixtures("short")
 def test_a_fit_too_far_from_the_paper_is_a_bad_verdict_and_the_page_says_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, short: Callable[[int], None]
 ) -> None:
+    short(7)
     monkeypatch.setattr(findings, "FIT_TOLERANCE", 0.001)
     made = run("--table", 1, page=tmp_path / "bad.html", as_json=False)
     assert isinstance(made.exception, VerdictError)
@@ -313,43 +330,43 @@ def test_verdicts_on_errors_follow_the_numbers() -> None:
     assert "3.00 times" in fails.here
 
 
-def test_verdicts_on_flights_follow_the_numbers() -> None:
-    (flown,) = reproduce((6,), 1, 16).flights
-    assert findings.of_flights(flown)[0].agrees
-    far = replace(flown, scores=flown.scores | {"max_position_error_m": {"median": 0.6, "p05": 0.5, "p95": 0.7}})
+def test_verdicts_on_flights_follow_the_numbers(flown: Callable[[int], Flights]) -> None:
+    landings = flown(6)
+    assert findings.of_flights(landings)[0].agrees
+    far = replace(landings, scores=landings.scores | {"max_position_error_m": {"median": 0.6, "p05": 0.5, "p95": 0.7}})
     said = findings.of_flights(far)
     assert not said[0].agrees
     assert findings.broken(said) == [said[0]]
     near = {"median": 0.27, "p05": 0.2, "p95": 0.3}
-    assert findings.of_flights(replace(flown, honest=flown.honest | {"max_position_error_m": near}))[2].agrees
-    assert not findings.of_flights(flown)[2].agrees
+    honest = landings.honest | {"max_position_error_m": near}
+    assert findings.of_flights(replace(landings, honest=honest))[2].agrees
+    assert not findings.of_flights(landings)[2].agrees
 
 
-def test_an_agreement_that_was_put_in_is_called_circular() -> None:
-    (flown,) = reproduce((5,), 1, 16).flights
-    largest, states, honest = findings.of_flights(flown)
+def test_an_agreement_that_was_put_in_is_called_circular(flown: Callable[[int], Flights]) -> None:
+    takeoffs = flown(5)
+    largest, states, honest = findings.of_flights(takeoffs)
     assert largest.agrees
     assert largest.verdict == "agrees, circular"
     assert "back-solved from the x of Table 5: 0.0653 m" in largest.here
     assert largest.as_json()["circular"] == largest.circular
     assert states.verdict == honest.verdict == "differs"
-    noisier = replace(flown, white_noise_m=0.6)  # the noise that the words name follows what was flown
+    noisier = replace(takeoffs, white_noise_m=0.6)  # the noise that the words name follows what was flown
     assert "0.6 m are back-solved" in findings.circular(noisier)
 
 
-def test_the_caption_of_figure_28_says_where_the_transient_comes_from() -> None:
-    (flown,) = reproduce((5,), 1, 16).flights
-    assert flown.lift_off is not None
-    of = flown.lift_off
+def test_the_caption_of_figure_28_says_where_the_transient_comes_from(flown: Callable[[int], Flights]) -> None:
+    takeoffs = flown(5)
+    assert takeoffs.lift_off is not None
+    of = takeoffs.lift_off
     assert (of.unshaken_m_s < of.shaken_m_s).mean() > 0.9
     assert 0.3 < of.unshaken_m_s.min() < of.shaken_m_s.max() < 0.8
     facts = of.as_json()
     assert facts["flights"] == 16
-    (figure,) = (panel for panel in panels(flown) if panel.key == "figure-28")
+    (figure,) = (panel for panel in panels(takeoffs) if panel.key == "figure-28")
     assert f"{facts['unshaken_m_s']['median']:.3f} m/s in the same flights" in figure.caption
     assert f"{100.0 * facts['frozen_inflow_share']['median']:.0f} % of the transient" in figure.caption
-    (landing,) = reproduce((6,), 1, 16).flights
-    assert landing.lift_off is None
+    assert flown(6).lift_off is None
 
 
 def test_the_selected_model_is_the_one_whose_frequency_the_text_gives() -> None:

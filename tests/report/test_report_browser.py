@@ -34,6 +34,19 @@ FIGURES = """() => [...document.querySelectorAll("[data-figure]")].map((host) =>
 })"""
 
 
+# The figures in the order in which they were first drawn, and as they stand on the page.
+DRAWN_IN_ORDER = """window.drawnInOrder = [];
+new MutationObserver((changes) => {
+  for (const { target } of changes) {
+    const key = target.dataset.figure;
+    if (key && target.dataset.drawn && !window.drawnInOrder.includes(key)) window.drawnInOrder.push(key);
+  }
+}).observe(document, { subtree: true, attributes: true, attributeFilter: ["data-drawn"] });"""
+FROM_THE_TOP = """[...document.querySelectorAll("[data-figure]")]
+  .sort((a, b) => a.getBoundingClientRect().top - b.getBoundingClientRect().top)
+  .map((figure) => figure.dataset.figure)"""
+
+
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     if CHROMIUM is None:
@@ -56,6 +69,36 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     rows = [cells(row) for row in rows_of_records(named)]
     write_records(named, errors, HEADINGS, rows, folder / "compared.html")
     return {path.stem: path for path in folder.iterdir()}
+
+
+@pytest.fixture(scope="module")
+def opened(browser: Any, pages: dict[str, Path]) -> Iterator[dict[str, Visit]]:
+    """Two pages on a wide screen, opened once for all tests that ask nothing else of them."""
+    visits = {page: Visit(browser, pages[page], width=1440, watch=DRAWN_IN_ORDER) for page in ("landing", "takeoff")}
+    yield visits
+    for visit in visits.values():
+        visit.context.close()
+
+
+@pytest.fixture
+def landing(opened: dict[str, Visit]) -> Visit:
+    return as_opened(opened["landing"])
+
+
+@pytest.fixture
+def takeoff(opened: dict[str, Visit]) -> Visit:
+    return as_opened(opened["takeoff"])
+
+
+def as_opened(visit: Visit) -> Visit:
+    """At its top, the whole flight, at the instant that it opens with, whatever a test before did."""
+    visit.page.mouse.move(0, 0)
+    visit.page.evaluate("scrollTo({ top: 0, behavior: 'instant' })")
+    if visit.page.locator("#scrub-whole").is_visible():
+        visit.page.locator("#scrub-whole").click()
+    visit.page.locator("#scrub").fill(visit.page.locator("#scrub").get_attribute("value"))
+    visit.paint()
+    return visit
 
 
 def figures(visit: Visit) -> dict[str, dict[str, Any]]:
@@ -96,7 +139,7 @@ def instants(visit: Visit, close: tuple[str, ...] = ("touchdown-", "pad-error", 
     return np.array(rows, float)
 
 
-@pytest.mark.parametrize(("page", "least"), [("landing", 15), ("takeoff", 14), ("replay", 11), ("compared", 4)])
+@pytest.mark.parametrize(("page", "least"), [("replay", 11), ("compared", 4)])
 def test_every_figure_is_drawn_and_nothing_is_loaded(
     browser: Any, pages: dict[str, Path], page: str, least: int
 ) -> None:
@@ -105,8 +148,13 @@ def test_every_figure_is_drawn_and_nothing_is_loaded(
     visit.context.close()
 
 
-def test_the_instant_under_the_pointer_moves_in_every_figure(browser: Any, pages: dict[str, Path]) -> None:
-    visit = Visit(browser, pages["landing"], width=1440)
+def test_every_figure_of_a_flight_is_drawn_and_nothing_is_loaded(landing: Visit, takeoff: Visit) -> None:
+    check(landing, 15)
+    check(takeoff, 14)
+
+
+def test_the_instant_under_the_pointer_moves_in_every_figure(landing: Visit) -> None:
+    visit = landing
     before = figures(visit)
     box = over(visit, "attitude")
     visit.page.mouse.move(box["x"] + share(12.5) * box["width"], box["y"] + 20)
@@ -121,11 +169,10 @@ def test_the_instant_under_the_pointer_moves_in_every_figure(browser: Any, pages
     assert changed > 8  # the values beside the lines are those of the instant
     assert "12.5" in visit.page.locator("#scrub-said").inner_text()
     assert float(visit.page.locator("#scrub").input_value()) == pytest.approx(12.5, abs=0.2)
-    visit.context.close()
 
 
-def test_values_beside_the_lines_are_the_records_at_the_instant(browser: Any, pages: dict[str, Path]) -> None:
-    visit = Visit(browser, pages["landing"], width=1440)
+def test_values_beside_the_lines_are_the_records_at_the_instant(landing: Visit) -> None:
+    visit = landing
     visit.page.locator("#scrub").fill("12.5")
     visit.until("document.documentElement.dataset.instant === '12.500'")
     record = navigated()
@@ -133,13 +180,10 @@ def test_values_beside_the_lines_are_the_records_at_the_instant(browser: Any, pa
     row = int(np.argmin(np.abs(truth["t_s"] - 12.5)))
     said = figures(visit)["position"]["said"]
     assert f"{truth['pos_d_m'][row]:.3f}".replace("-", "\N{MINUS SIGN}") in said
-    visit.context.close()
 
 
-def test_zooming_one_panel_zooms_all_and_the_button_shows_the_whole_flight(
-    browser: Any, pages: dict[str, Path]
-) -> None:
-    visit = Visit(browser, pages["landing"], width=1440)
+def test_zooming_one_panel_zooms_all_and_the_button_shows_the_whole_flight(landing: Visit) -> None:
+    visit = landing
     box = over(visit, "velocity")
     mouse = visit.page.mouse
     mouse.move(box["x"] + share(10.0) * box["width"], box["y"] + 30)
@@ -158,11 +202,10 @@ def test_zooming_one_panel_zooms_all_and_the_button_shows_the_whole_flight(
     visit.until("document.documentElement.dataset.zoom === ''")
     visit.until_it_is(lambda: instants(visit), pytest.approx(share(20.0), abs=0.01))
     assert visit.errors == []
-    visit.context.close()
 
 
-def test_the_scrubber_moves_by_keys_and_says_where_it_is(browser: Any, pages: dict[str, Path]) -> None:
-    visit = Visit(browser, pages["landing"], width=1440)
+def test_the_scrubber_moves_by_keys_and_says_where_it_is(landing: Visit) -> None:
+    visit = landing
     slider = visit.page.locator("#scrub")
     slider.focus()
     start = float(slider.input_value())
@@ -174,11 +217,10 @@ def test_the_scrubber_moves_by_keys_and_says_where_it_is(browser: Any, pages: di
     assert float(slider.input_value()) == pytest.approx(start - 4.0, abs=0.15)
     assert slider.get_attribute("aria-valuetext").endswith("s, approach")
     assert slider.get_attribute("aria-label") == "Instant"
-    visit.context.close()
 
 
-def test_play_moves_the_instant_and_pause_holds_it(browser: Any, pages: dict[str, Path]) -> None:
-    visit = Visit(browser, pages["landing"], width=1440)
+def test_play_moves_the_instant_and_pause_holds_it(landing: Visit) -> None:
+    visit = landing
     visit.page.locator("#scrub").fill("5")
     visit.page.locator("#scrub-play").click()
     assert visit.page.locator("#scrub-play").get_attribute("aria-label") == "Pause"
@@ -189,11 +231,10 @@ def test_play_moves_the_instant_and_pause_holds_it(browser: Any, pages: dict[str
     held = visit.page.evaluate("document.documentElement.dataset.instant")
     visit.page.wait_for_timeout(300)  # in which a flight that still played would go on
     assert visit.page.evaluate("document.documentElement.dataset.instant") == held
-    visit.context.close()
 
 
-def test_a_panels_data_as_csv_are_the_records_columns(browser: Any, pages: dict[str, Path]) -> None:
-    visit = Visit(browser, pages["takeoff"], width=1440)
+def test_a_panels_data_as_csv_are_the_records_columns(takeoff: Visit) -> None:
+    visit = takeoff
     with visit.page.expect_download() as waiting:
         visit.page.locator("[data-csv=position]").click()
     saved = waiting.value
@@ -206,18 +247,16 @@ def test_a_panels_data_as_csv_are_the_records_columns(browser: Any, pages: dict[
         values = np.array([float(row[name]) for row in rows if row[name]])
         assert t_s == pytest.approx(record.tables[table]["t_s"], abs=1e-6)
         assert values == pytest.approx(record.tables[table]["pos_d_m"], abs=1e-5)
-    visit.context.close()
 
 
-def test_an_event_in_a_table_moves_the_page_to_it(browser: Any, pages: dict[str, Path]) -> None:
-    visit = Visit(browser, pages["takeoff"], width=1440)
+def test_an_event_in_a_table_moves_the_page_to_it(takeoff: Visit) -> None:
+    visit = takeoff
     visit.page.locator("tr:has(.phase):has-text('climb') .goto").click()
     visit.until("Math.abs(document.documentElement.dataset.instant - 10) < 1")
-    visit.context.close()
 
 
-def test_a_label_hides_what_it_names(browser: Any, pages: dict[str, Path]) -> None:
-    visit = Visit(browser, pages["landing"], width=1440)
+def test_a_label_hides_what_it_names(landing: Visit) -> None:
+    visit = landing
     pressed = "document.querySelector('[data-figure=position] .end[title^=\"truth:\"]').getAttribute('aria-pressed')"
     over(visit, "position")
     visit.page.locator("[data-figure=position] .end[title^='truth:']").first.click()
@@ -225,11 +264,10 @@ def test_a_label_hides_what_it_names(browser: Any, pages: dict[str, Path]) -> No
     visit.page.locator("[data-figure=position] .end[title^='truth:']").first.click()
     assert visit.page.evaluate(pressed) == "true"
     assert visit.errors == []
-    visit.context.close()
 
 
-def test_the_path_in_space_turns_by_keys_and_by_drag(browser: Any, pages: dict[str, Path]) -> None:
-    visit = Visit(browser, pages["takeoff"], width=1440)
+def test_the_path_in_space_turns_by_keys_and_by_drag(takeoff: Visit) -> None:
+    visit = takeoff
     canvas = visit.page.locator("[data-figure=path-3d] > canvas")
     seen = [canvas.get_attribute("data-mark")]
     visit.page.locator("#scrub").fill("12")
@@ -246,7 +284,6 @@ def test_the_path_in_space_turns_by_keys_and_by_drag(browser: Any, pages: dict[s
     visit.page.mouse.up()
     seen.append(canvas.get_attribute("data-mark"))
     assert len(set(seen)) == 4
-    visit.context.close()
 
 
 @pytest.mark.parametrize("page", ["takeoff", "replay", "compared"])
@@ -292,24 +329,11 @@ def test_paper_gets_light_figures_that_fit_and_all_details(browser: Any, pages: 
     visit.context.close()
 
 
-DRAWN_IN_ORDER = """window.drawnInOrder = [];
-new MutationObserver((changes) => {
-  for (const { target } of changes) {
-    const key = target.dataset.figure;
-    if (key && target.dataset.drawn && !window.drawnInOrder.includes(key)) window.drawnInOrder.push(key);
-  }
-}).observe(document, { subtree: true, attributes: true, attributeFilter: ["data-drawn"] });"""
-FROM_THE_TOP = """[...document.querySelectorAll("[data-figure]")]
-  .sort((a, b) => a.getBoundingClientRect().top - b.getBoundingClientRect().top)
-  .map((figure) => figure.dataset.figure)"""
-
-
-def test_what_stands_higher_is_drawn_first(browser: Any, pages: dict[str, Path]) -> None:
-    visit = Visit(browser, pages["landing"], width=1440, watch=DRAWN_IN_ORDER)
+def test_what_stands_higher_is_drawn_first(landing: Visit) -> None:
+    visit = landing
     drawn = visit.page.evaluate("window.drawnInOrder")
     assert len(drawn) > 10
     assert drawn == visit.page.evaluate(FROM_THE_TOP)
-    visit.context.close()
 
 
 @pytest.mark.real_time

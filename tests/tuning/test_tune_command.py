@@ -26,12 +26,13 @@ from tuning_logs import noisy_flight
 
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory) -> Path:
-    """Made logs: `long` and `other` whose flow reports 0.85 of the motion and whose gyro is eight times as good as
+    """Made logs: `long`, `one` and `two` whose flow reports 0.85 of the motion and whose gyro is eight times as good as
     stated; `right`, as stated; `unseen`, without truth and GPS; `outside`, with GPS alone.
     """
     folder = tmp_path_factory.mktemp("logs")
     noisy_flight(folder / "long", flow_gain=0.85)
-    noisy_flight(folder / "other", flow_gain=0.85, seed=101, duration_s=60.0)
+    noisy_flight(folder / "one", flow_gain=0.85, duration_s=50.0)
+    noisy_flight(folder / "two", flow_gain=0.85, seed=101, duration_s=45.0)
     noisy_flight(folder / "right", gyro=0.004, accel=0.05, seed=101)
     noisy_flight(folder / "unseen", flow_gain=0.85, truth=False, duration_s=50.0)
     noisy_flight(folder / "outside", gps=True, truth=False, duration_s=60.0)
@@ -109,11 +110,11 @@ def test_the_file_says_where_it_is_from_and_replay_takes_it(logs, monkeypatch):
 
 
 def test_the_order_of_logs_changes_nothing_and_one_is_held_out_whole(logs):
-    first = answer(logs / "long", logs / "other", "--out", "first.toml")
-    second = answer(logs / "other", logs / "long", "--out", "second.toml")
+    first = answer(logs / "one", logs / "two", "--out", "first.toml")
+    second = answer(logs / "two", logs / "one", "--out", "second.toml")
     assert first | {"file": None} == second | {"file": None}
     assert first["verdict"] == "accepted"
-    assert [(log["log"], log["held_out_whole"]) for log in first["logs"]] == [("long", False), ("other", True)]
+    assert [(log["log"], log["held_out_whole"]) for log in first["logs"]] == [("one", False), ("two", True)]
     assert first["logs"][1]["fit_windows"] == []
     assert first["logs"][1]["gain_nats"] > 0.0
     assert tomllib.loads(Path("first.toml").read_text()) == tomllib.loads(Path("second.toml").read_text())

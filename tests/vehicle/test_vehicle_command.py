@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+from functools import cache
 
 import pytest
 import typer
 from typer.testing import CliRunner
 
 from flownav.cli.vehicle import command
+from flownav.control import margins
 from flownav.core.errors import InputError, VerdictError
 from flownav.core.parameter_files import shipped
 from flownav.vehicle.kinds import SHIPPED_VEHICLE
@@ -22,6 +24,14 @@ APP.command()(command)
 
 def run(*arguments):
     return CliRunner().invoke(APP, list(arguments))
+
+
+@pytest.fixture(scope="module")
+def _computed_once():
+    """The margins at 123 corners take a while, and are the same however they are printed."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(margins, "margins_over_box", cache(margins.margins_over_box))
+        yield
 
 
 def test_json_is_one_object_with_the_promised_keys():
@@ -66,6 +76,7 @@ def test_a_bad_file_is_an_input_error_and_prints_nothing(tmp_path):
     assert result.stdout == ""
 
 
+@pytest.mark.usefixtures("_computed_once")
 def test_margins_are_a_row_a_loop_and_corner():
     result = run("--margins", "--json")
     assert result.exit_code == 0
@@ -79,6 +90,7 @@ def test_margins_are_a_row_a_loop_and_corner():
     assert facts["cannot_hover"] == []
 
 
+@pytest.mark.usefixtures("_computed_once")
 def test_margins_as_a_table_name_the_least_of_each_loop():
     text = run("--margins").stdout
     for part in ("velocity forward", "[°]", "123 corners", "flapping stiffness"):

@@ -59,8 +59,10 @@ def command(
     from flownav.campaigns.run import engine_named, require_engine
     from flownav.campaigns.summary import WORST_FLIGHTS
     from flownav.cli.campaign_said import fly_again, fly_rare
+    from flownav.core.memory import give_back_early
     from flownav.parts.flying import OwnPartsEngine, identities
 
+    give_back_early()
     planned = _planned_flights(out) if flight is not None else None
     count = _flights_of(flights, planned, until=not (until is None and rare is None))
     require_between("--records", records, 0, WORST_FLIGHTS)

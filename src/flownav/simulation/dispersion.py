@@ -17,6 +17,7 @@ vehicle is built, weighed and calibrated; "day", on the day, from a forecast, a 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, Protocol
 from zlib import crc32
@@ -26,6 +27,7 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from flownav.core.measurement import Array
 from flownav.core.parameter_files import Number, ParameterModel, load, shipped
+from flownav.simulation.inverses import inverse_of
 from flownav.simulation.noise import threefry
 
 Known = Literal["build", "day", "never"]
@@ -65,20 +67,30 @@ class Distribution(ParameterModel):
         return dict(self.model_extra or {})
 
     def frozen(self) -> Any:
-        """SciPy's distribution with these parameters. ValueError where there is none such."""
-        from scipy import stats
+        """The distribution with these parameters, SciPy's or one that stands for it (`ppf`, `support`).
 
-        family = getattr(stats, self.distribution, None)
-        if not isinstance(family, stats.rv_continuous):
-            raise ValueError(f'distribution = "{self.distribution}": no continuous distribution of scipy.stats')
-        wanted = [name.strip() for name in (family.shapes or "").split(",") if name.strip()]
-        if sorted(wanted) != sorted(self.shapes):
-            named = ", ".join(wanted) or "none"
-            raise ValueError(f'distribution = "{self.distribution}" has the shape parameters {named}')
-        found = family(**self.shapes, loc=self.loc, scale=self.scale)
-        if not np.isfinite(found.ppf(0.5)):
-            raise ValueError(f'distribution = "{self.distribution}" cannot be with {self.shapes or "this scale"}')
-        return found
+        ValueError where there is none such.
+        """
+        if known := inverse_of(self.distribution, self.shapes, self.loc, self.scale):
+            return known
+        return _frozen(self.distribution, self.loc, self.scale, tuple(sorted(self.shapes.items())))
+
+
+@lru_cache(maxsize=1024)
+def _frozen(name: str, loc: float, scale: float, shapes: tuple[tuple[str, float], ...]) -> Any:
+    """SciPy takes 2 ms to make one, and a ranking asks for the same fifty again and again."""
+    from scipy import stats  # not without need: it takes 46 MB
+
+    family = getattr(stats, name, None)
+    if not isinstance(family, stats.rv_continuous):
+        raise ValueError(f'distribution = "{name}": no continuous distribution of scipy.stats')
+    wanted = [shape.strip() for shape in (family.shapes or "").split(",") if shape.strip()]
+    if sorted(wanted) != [shape for shape, _ in shapes]:
+        raise ValueError(f'distribution = "{name}" has the shape parameters {", ".join(wanted) or "none"}')
+    found = family(**dict(shapes), loc=loc, scale=scale)
+    if not np.isfinite(found.ppf(0.5)):
+        raise ValueError(f'distribution = "{name}" cannot be with {dict(shapes) or "this scale"}')
+    return found
 
 
 class DispersionSection(ParameterModel):

@@ -12,10 +12,13 @@ from numba.extending import overload, register_jitable
 
 from flownav.core.compiling import target
 from flownav.core.compiling.cache import STORE, KernelCache
+from flownav.core.compiling.handed import hand_over_whole
 from flownav.core.compiling.pipeline import LeanCompiler
 from flownav.core.compiling.progress import compiling
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+hand_over_whole()
 
 LANES_WIDE = 16
 MOST_SPARED = 8  # calls of a kernel that are left to Python, together about as long as compiling it

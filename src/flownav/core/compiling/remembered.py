@@ -10,12 +10,13 @@ from functools import cache
 from types import FunctionType
 from typing import Any, cast
 
-from numba.core import base, errors, event, ir, postproc, targetconfig, transforms, types
+from numba.core import base, errors, event, ir, postproc, ssa, targetconfig, transforms, types
 from numba.core.datamodel.models import TupleModel
 from numba.core.runtime.context import NRTContext
 
 OPERATORS = frozenset(function for function in vars(operator).values() if callable(function))
 _typed: dict[tuple[Any, ...], Any] = {}
+_hashes: dict[int, tuple[int, Any]] = {}  # by id, each with its type, which is kept alive by that
 
 
 @contextmanager
@@ -69,23 +70,41 @@ def _type_of_equation(self: Any, context: Any, args: Any, kws: Any) -> Any:
 def _variables(self: Any, value: Any) -> list[Any]:
     """The variables that a part of an instruction names."""
     found: list[Any] = []
-    _collect(value, found)
+    _collect(value if isinstance(value, dict | list | tuple) else (value,), found)
     return found
 
 
 def _collect(value: Any, found: list[Any]) -> None:
     """Most parts of an instruction are variables, or plain texts and numbers, which is seen at once."""
-    if isinstance(value, ir.Inst):
-        found.extend(value.list_vars())
-    elif isinstance(value, dict | list | tuple):
-        for part in value.values() if isinstance(value, dict) else value:
-            kind = type(part)
-            if kind is ir.Var:
-                found.append(part)
-            elif kind not in PLAIN:
-                _collect(part, found)
-    elif isinstance(value, ir.Var):
-        found.append(value)
+    for part in value.values() if isinstance(value, dict) else value:
+        kind = type(part)
+        if kind is ir.Var:
+            found.append(part)
+        elif kind in PLAIN:
+            continue
+        elif isinstance(part, ir.Inst):
+            found.extend(part.list_vars())
+        elif isinstance(part, dict | list | tuple):
+            _collect(part, found)
+        elif isinstance(part, ir.Var):
+            found.append(part)
+
+
+def _renamed(states: Any, block: Any, handler: Any) -> Iterator[Any]:
+    """What becomes of each statement of a block; Numba also puts every one of them into words for a log."""
+    for statement in block.body:
+        yield (handler.on_assign if isinstance(statement, ir.Assign) else handler.on_other)(states, statement)
+
+
+def _hash_of_type(self: Any) -> int:
+    """The hash of a type, which Numba computes anew from all its parts; that of a mere copy is not kept."""
+    known = _hashes.get(id(self))
+    if known is not None:
+        return known[0]
+    found = hash(self.key)
+    if "_code" in self.__dict__:
+        _hashes[id(self)] = found, self
+    return found
 
 
 def _counted_parts(self: Any, builder: Any, kind: Any, value: Any) -> list[Any]:
@@ -147,6 +166,8 @@ PATCHES: tuple[tuple[Any, str, Any], ...] = (
     (types.Function, "get_call_type", _type_of_call),
     (base, "_has_loc", cache(base._has_loc)),
     (ir.Inst, "_rec_list_vars", _variables),
+    (ssa, "_run_ssa_block_pass", _renamed),
+    (types.Type, "__hash__", _hash_of_type),
     (NRTContext, "get_meminfos", _counted_parts),
     (event, "install_timer", _no_timer),
     (targetconfig.TargetConfig, "values", _option_values),

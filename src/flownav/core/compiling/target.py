@@ -6,6 +6,8 @@ functions that only kernels call this is waste. Inside `lean()`
 - a function without a loop is left as it is until a caller with a loop, or the entry, has inlined it;
 - a function with a loop is optimised by itself, with all it calls inlined, because LLVM vectorises a loop over lanes
   reliably only while it stands alone;
+- a function that only looks as if it had a loop (it has branches, which Numba writes in any order) is optimised by
+  itself for callers on sixteen lanes, which vectorise better then, and not for those on one lane: that is two of three;
 - only an entry (what Python or C calls) is turned into machine code, by one pipeline: Numba's first one gathers
   reference counts, which kernels do not have.
 
@@ -21,7 +23,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numba
@@ -37,6 +39,7 @@ from flownav.core.compiling.remembered import remembering
 
 COLLECT_AFTER = 50_000  # objects; Python's own 700 costs a tenth of the time of a compilation
 ENVIRONMENT_SYMBOL = "_ZN08NumbaEnv"
+ONE_LANE_MARKS = "UniTupleIxLi1EE", "UniTuple_28int64_20x_201_29"  # `ONE_LANE` in a function's name, in a record's
 
 # A lane loop must reach the vectoriser as a loop. Left alone, LLVM fully unrolls one whose body is still a
 # call (equations are inlined later) and the lanes come out scalar; loops of 8 and fewer may unroll.
@@ -96,6 +99,8 @@ class LeanLibrary(JITCodeLibrary):
     def __init__(self, codegen: Any, name: str) -> None:
         super().__init__(codegen, name)
         self._has_loop = False
+        self._jumps_back = False
+        self._names_one_lane = False
         self._whole = False  # linked with all that it calls, and optimised
         self._in_engine = False
         self._bitcode = b""
@@ -103,6 +108,8 @@ class LeanLibrary(JITCodeLibrary):
     def add_ir_module(self, ir_module: Any) -> None:
         """Take the code of this function, or that of its entry for Python or C."""
         self._has_loop |= any(map(_has_loop, ir_module.functions))
+        self._jumps_back |= any(map(_jumps_back, ir_module.functions))
+        self._names_one_lane |= any(f.blocks and any(m in f.name for m in ONE_LANE_MARKS) for f in ir_module.functions)
         module = llvm.parse_assembly(cgutils.normalize_ir_text(str(ir_module)))
         module.name = ir_module.name
         self.add_llvm_module(module)
@@ -129,6 +136,17 @@ class LeanLibrary(JITCodeLibrary):
         passes, builder = self._codegen._module_pass_manager()
         passes.run(self._final_module, builder)
         self._whole = True
+
+    @cached_property
+    def is_of_one_lane(self) -> bool:
+        """Whether it, or something that it calls, is a function on one lane; asked when it is finished."""
+        return self._names_one_lane or any(getattr(lib, "is_of_one_lane", False) for lib in self._linking_libraries)
+
+    def make_ready_for_lanes(self) -> None:
+        """Optimise by itself what only looks as if it had a loop."""
+        if self._jumps_back and not self._whole:
+            self._make_whole()
+            self._shared_module = None  # what callers on one lane were given
 
     def _link_into(self, module: Any) -> None:
         """Put the code of everything that this function calls into a module."""
@@ -211,6 +229,8 @@ def _called(library: Any) -> list[Any]:
         for called in caller._linking_libraries:
             if id(called) not in found:
                 found[id(called)] = called
+                if isinstance(called, LeanLibrary) and not library.is_of_one_lane:
+                    called.make_ready_for_lanes()
                 if isinstance(called, LeanLibrary) and not called._whole:
                     visit(called)
                 done.append(called)
@@ -219,15 +239,25 @@ def _called(library: Any) -> list[Any]:
     return done[::-1]
 
 
-def _has_loop(function: ir.Function) -> bool:
-    """Whether some block of a function jumps back to itself or to one before it."""
+def _followers(function: ir.Function) -> list[list[int]]:
+    """Of each block, by its place, the places of those that it may jump to."""
     order = {block.name: place for place, block in enumerate(function.blocks)}
-    return any(
-        isinstance(operand, ir.Block) and order[operand.name] <= place
-        for place, block in enumerate(function.blocks)
-        if block.terminator is not None
-        for operand in block.terminator.operands
-    )
+    ends = (() if block.terminator is None else block.terminator.operands for block in function.blocks)
+    return [[order[operand.name] for operand in end if isinstance(operand, ir.Block)] for end in ends]
+
+
+def _jumps_back(function: ir.Function) -> bool:
+    """Whether some block of a function jumps back to itself or to one before it, as every loop does."""
+    return any(then <= place for place, thens in enumerate(_followers(function)) for then in thens)
+
+
+def _has_loop(function: ir.Function) -> bool:
+    """Whether some block of a function may come back to itself: those from which nothing leads on are taken away."""
+    followers = dict(enumerate(_followers(function)))
+    while done := [place for place, thens in followers.items() if followers.keys().isdisjoint(thens)]:
+        for place in done:
+            del followers[place]
+    return bool(followers)
 
 
 class LeanCodegen(JITCPUCodegen):

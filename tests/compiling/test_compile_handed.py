@@ -12,8 +12,8 @@ from numba.core.datamodel.manager import DataModelManager
 from numba.core.datamodel.registry import default_manager
 
 from flownav.core.compile import LANES, ONE_LANE, equation, kernel, procedure
+from flownav.core.compiling.loops import has_loop, jumps_back
 from flownav.core.compiling.remembered import remembering
-from flownav.core.compiling.target import _has_loop, _jumps_back
 
 
 class Inside(NamedTuple):
@@ -118,7 +118,7 @@ def jumping(*thens: tuple[int, ...]) -> ir.Function:
 )
 def test_a_loop_is_what_comes_back_to_itself(thens, back, loop):
     function = jumping(*thens)
-    assert (_jumps_back(function), _has_loop(function)) == (back, loop)
+    assert (jumps_back(function), has_loop(function)) == (back, loop)
 
 
 @equation

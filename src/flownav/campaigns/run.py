@@ -1,7 +1,10 @@
 """A campaign flown, cell by cell, until all flights are there or are enough; and one flight of it again."""
 
+import ctypes
 import os
+import sys
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple, Protocol
@@ -23,6 +26,9 @@ from flownav.simulation.truth import SensorFault
 
 ENGINES = ("local", "ray", "cuda")
 LANDING, TAKEOFF = "r95_m", "p95_axis_m"  # what is followed while a campaign flies
+# parameters of glibc's mallopt (malloc.h)
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8
+LARGE_BYTES = 1 << 20  # a piece of this size is asked of the system, and goes back to it when it is free
 
 
 class Progress(NamedTuple):
@@ -179,3 +185,24 @@ def engine_named(name: str) -> Engine:
 
         return Cuda(processes=os.cpu_count() or 1)
     return RayCluster() if name == "ray" else Local()
+
+
+# -- the process's memory ---------------------------------------------------------------------------------------
+def give_back_early() -> None:
+    """From now on, in this process: large pieces do not stay in the heap, threads share one, Arrow keeps none.
+
+    By itself glibc keeps pieces of up to 32 MB once one of that size was freed, in a heap for each thread. Another C
+    library does what it does.
+    """
+    if sys.platform == "linux":
+        with suppress(OSError, AttributeError):
+            mallopt = ctypes.CDLL(None).mallopt
+            for parameter, value in (
+                (M_MMAP_THRESHOLD, LARGE_BYTES),
+                (M_TRIM_THRESHOLD, LARGE_BYTES),
+                (M_ARENA_MAX, 1),
+            ):
+                mallopt(parameter, value)
+    import pyarrow
+
+    pyarrow.set_memory_pool(pyarrow.system_memory_pool())

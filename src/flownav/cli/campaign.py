@@ -56,10 +56,9 @@ def command(
     """Fly a scenario many times: radii, shares and percentiles with intervals, a dataset, the worst flights."""
     from flownav.api.calls import split
     from flownav.api.campaigning import plan_of
-    from flownav.campaigns.run import engine_named, require_engine
+    from flownav.campaigns.run import engine_named, give_back_early, require_engine
     from flownav.campaigns.summary import WORST_FLIGHTS
     from flownav.cli.campaign_said import fly_again, fly_rare
-    from flownav.core.memory import give_back_early
     from flownav.parts.flying import OwnPartsEngine, identities
 
     give_back_early()

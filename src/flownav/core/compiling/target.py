@@ -28,13 +28,13 @@ from typing import Any, NamedTuple
 
 import numba
 from llvmlite import binding as llvm
-from llvmlite import ir
 from numba.core import cgutils
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.environment import lookup_environment
 from numba.core.registry import cpu_target
 
+from flownav.core.compiling.loops import has_loop, jumps_back
 from flownav.core.compiling.remembered import remembering
 
 COLLECT_AFTER = 50_000  # objects; Python's own 700 costs a tenth of the time of a compilation
@@ -107,8 +107,8 @@ class LeanLibrary(JITCodeLibrary):
 
     def add_ir_module(self, ir_module: Any) -> None:
         """Take the code of this function, or that of its entry for Python or C."""
-        self._has_loop |= any(map(_has_loop, ir_module.functions))
-        self._jumps_back |= any(map(_jumps_back, ir_module.functions))
+        self._has_loop |= any(map(has_loop, ir_module.functions))
+        self._jumps_back |= any(map(jumps_back, ir_module.functions))
         self._names_one_lane |= any(f.blocks and any(m in f.name for m in ONE_LANE_MARKS) for f in ir_module.functions)
         module = llvm.parse_assembly(cgutils.normalize_ir_text(str(ir_module)))
         module.name = ir_module.name
@@ -237,27 +237,6 @@ def _called(library: Any) -> list[Any]:
 
     visit(library)
     return done[::-1]
-
-
-def _followers(function: ir.Function) -> list[list[int]]:
-    """Of each block, by its place, the places of those that it may jump to."""
-    order = {block.name: place for place, block in enumerate(function.blocks)}
-    ends = (() if block.terminator is None else block.terminator.operands for block in function.blocks)
-    return [[order[operand.name] for operand in end if isinstance(operand, ir.Block)] for end in ends]
-
-
-def _jumps_back(function: ir.Function) -> bool:
-    """Whether some block of a function jumps back to itself or to one before it, as every loop does."""
-    return any(then <= place for place, thens in enumerate(_followers(function)) for then in thens)
-
-
-def _has_loop(function: ir.Function) -> bool:
-    """Whether some block of a function may come back to itself: those from which nothing leads on are taken away."""
-    followers = dict(enumerate(_followers(function)))
-    while done := [place for place, thens in followers.items() if followers.keys().isdisjoint(thens)]:
-        for place in done:
-            del followers[place]
-    return bool(followers)
 
 
 class LeanCodegen(JITCPUCodegen):

@@ -9,7 +9,7 @@ import pytest
 
 SCRIPT = """
 import numpy as np
-from flownav.core.memory import give_back_early
+from flownav.campaigns.run import give_back_early
 if {early}:
     give_back_early()
 def rss():

@@ -60,22 +60,26 @@ def test_down_the_hill_below_the_pads_height_is_not_below_the_ground():
 
 
 def test_over_a_decks_edge_and_back_the_range_jumps_and_the_landing_holds():
-    """From the pad on a deck out over the edge, a metre down, and back: the navigator's range sees two grounds."""
+    """From the pad on a deck out over the edge, a metre down, and back: the navigator's range sees two grounds.
+
+    Until it believes in each, flow is taken over a height that is wrong by a metre: it lands some 1.3 m to the north.
+    """
     path = [
         {"t_s": 0.0, "height_m": 0.0}, {"t_s": 5.0, "height_m": 0.0}, {"t_s": 8.0, "height_m": 2.0},
-        {"t_s": 13.0, "north_m": 4.0, "height_m": 2.0}, {"t_s": 18.0, "north_m": 4.0, "height_m": 2.0},
+        {"t_s": 14.0, "north_m": 6.0, "height_m": 2.0}, {"t_s": 17.0, "north_m": 6.0, "height_m": 2.0},
         {"t_s": 23.0, "height_m": 2.0}, {"t_s": 25.0, "height_m": 2.0}, {"t_s": 50.0, "height_m": -5.5},
     ]  # fmt: skip
     entries = load_scenario("pad_return").flight.model_dump(exclude_unset=True) | {"path": path}
-    edge = {"step_m": -1.0, "edge_north_m": 2.0, "edge_toward_deg": 0.0}
+    edge = {"step_m": -1.0, "edge_north_m": 4.0, "edge_toward_deg": 0.0}
     _, scores, history = flown("pad_return", flight=entries, ground=edge)
     out = history[:, column("truth", "pos_n_m")].max(axis=0)
-    assert (out > 3.0).all()
+    assert (out > 5.0).all()
     assert (history[900, column("truth", "ground_m")] == -1.0).all()
     over = -history[:, column("truth", "pos_d_m")] - history[:, column("truth", "ground_m")]
     assert over[840:900].mean(axis=0) == pytest.approx(2.2, abs=0.3)  # it flies over the ground that it finds
     assert over[100:].min() > 0.15  # and meets neither the edge's face nor the deck but with its skids
     assert landed(scores).all()
+    assert np.median(scores["touchdown.rest.distance_m"]) < 1.6
 
 
 # -- the engine ------------------------------------------------------------------------------------------------------

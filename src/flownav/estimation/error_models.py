@@ -74,16 +74,13 @@ def propagate_walks(work: Work, lanes: Lanes, dt_s: float, settings: FilterSetti
         over = over_ground(
             work[(STATE + VELOCITY) * len(lanes) + lane], work[(STATE + VELOCITY + 1) * len(lanes) + lane]
         )
-        add_noise_lane(work, lanes, GROUND, lane, squared(over * settings.ground_walk_m_rt_s) * dt_s)
+        add_noise_lane(work, lanes, GROUND, lane, over * squared(settings.ground_walk_m_rt_s) * dt_s)
     add_noise(work, lanes, BARO, squared(settings.baro_walk_m_rt_s) * dt_s)
 
 
 @equation
 def over_ground(north_m_s: float, east_m_s: float) -> float:
-    """How much ground passes below, as a share of what passes at OVER_GROUND_M_S.
-
-    A hover is over one place: what passes below it passes again, so that the walk's variance goes with the square.
-    """
+    """How much ground passes below, as a share of what passes at OVER_GROUND_M_S: a hover is over one place."""
     return smaller(np.sqrt(squared(north_m_s) + squared(east_m_s)) / OVER_GROUND_M_S, 1.0)
 
 

@@ -59,7 +59,7 @@ def test_a_slow_line_that_everything_is_asked_of_loses_frames_and_grows_old(flig
 @pytest.mark.real_time
 @pytest.mark.parametrize("baud", BAUDS)
 def test_a_real_line_carries_what_is_asked_of_it(flight, baud):
-    """Over a pseudo-terminal; the start takes most of the 11 s. What a loaded machine loses is the benchmark's."""
+    """Over a pseudo-terminal, of 11 s with the start. What a loaded machine loses is the benchmark's."""
     log, setup = flight
     flown = fly_over(baud, SimulatedVehicle(log), FLOWN_S, options_of(setup, baud))
     assert_it_fits(flown, baud)

@@ -56,6 +56,12 @@ def heading_cosine_sine(rotation: Rotation) -> tuple[Scalar, Scalar]:
 
 
 @equation
+def turned_level(x: Scalar, y: Scalar, cosine: Scalar, sine: Scalar) -> tuple[Scalar, Scalar]:
+    """(x, y) turned from x towards y by the angle of this cosine and sine: body forward, right to north, east."""
+    return cosine * x - sine * y, sine * x + cosine * y
+
+
+@equation
 def quaternion_product(a: Quaternion, b: Quaternion) -> Quaternion:
     """Hamilton product a b of quaternions `(w, x, y, z)`."""
     aw, ax, ay, az = a

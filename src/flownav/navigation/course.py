@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.compile import arctan2, cos, equation, replacing, sin
-from flownav.core.frames import heading_cosine_sine, quaternion_product, velocity_from_flow
+from flownav.core.frames import heading_cosine_sine, quaternion_product, turned_level, velocity_from_flow
 from flownav.estimation.named import Attitude, rotation_by
 from flownav.estimation.states import ATTITUDE
 from flownav.navigation.motion_records import CourseMemory
@@ -111,7 +111,8 @@ def note_flow_course(
     u, v = velocity_from_flow(x, y, look.range_m) if angular else (x, y)
     cosine, sine = heading_cosine_sine(rotation_by(own))
     counts = (not sought or heading.sought > 0.0) and is_heard(reading) and bool(np.isfinite(u + v))
-    return with_flow(cosine * u - sine * v, sine * u + cosine * v, t_s, m) if counts else m
+    north, east = turned_level(u, v, cosine, sine)
+    return with_flow(north, east, t_s, m) if counts else m
 
 
 class FoundHeading(NamedTuple):

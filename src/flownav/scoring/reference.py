@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.core.frames import turned_level
 from flownav.core.measurement import Array
 
 VELOCITY_SPAN_S = 0.1
@@ -29,9 +30,8 @@ class Alignment(NamedTuple):
 
     def turned(self, vectors_ned: Array) -> Array:
         """Vectors (n, 3) in the estimate's axes."""
-        cosine, sine = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
         north, east, down = vectors_ned.T
-        return np.column_stack([cosine * north - sine * east, sine * north + cosine * east, down])
+        return np.column_stack([*turned_level(north, east, np.cos(self.yaw_rad), np.sin(self.yaw_rad)), down])
 
     def moved(self, positions_ned_m: Array) -> Array:
         """Positions (n, 3) in the estimate's frame."""

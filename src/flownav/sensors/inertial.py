@@ -23,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.compile import clamp, equation, larger
+from flownav.core.frames import turned_level
 from flownav.sensors.processes import factor
 
 QUALITY = 255.0
@@ -223,7 +224,7 @@ def _turned(cosine: float, sine: float, by: tuple[float, float], further_rad: fl
     square = further_rad * further_rad
     near, off = 1.0 - square * (0.5 - square / 24.0), further_rad * (1.0 - square / 6.0)
     c, s = by[0] * near - by[1] * off, by[1] * near + by[0] * off
-    return c * cosine - s * sine, s * cosine + c * sine
+    return turned_level(cosine, sine, c, s)
 
 
 @equation

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import fftconvolve
 
+from flownav.core.frames import turned_level
 from flownav.core.measurement import Array
 from flownav.lab.identification.descent import DELAY_RANGE_S, Structure
 from flownav.lab.identification.experiment import Experiment, experiment
@@ -201,9 +202,8 @@ def _inertial_velocity(flown: Flight, grid: Array) -> Array:
 
 
 def _turned(velocity: Array, angle_rad: float) -> Array:
-    cosine, sine = np.cos(angle_rad), np.sin(angle_rad)
     north, east, down = velocity.T
-    return np.column_stack([cosine * north - sine * east, sine * north + cosine * east, down])
+    return np.column_stack([*turned_level(north, east, np.cos(angle_rad), np.sin(angle_rad)), down])
 
 
 def fast_flow(flown: Flight, grid: Array, velocity: Array) -> Array:

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from flownav.core.frames import rotation_from_quaternion, to_earth
 from flownav.core.measurement import Sensor
 from flownav.live.byte_links import SerialLink, open_link
 from flownav.live.filtering import Keeper
@@ -178,7 +179,8 @@ class Flown(NamedTuple):
     """What became of a flight over the line, all after SETTLED_S of it.
 
     Rates [bytes/s]; lost: frames that the UART's buffer did not take; ages [s]: of the newest reading when an estimate
-    is due, and of an estimate when it arrives; error_m: horizontal position of what arrived, less its mean.
+    is due, and of an estimate when it arrives; error_m: horizontal position of what arrived, less its mean;
+    velocity_error_m_s: of all three axes, rms.
     """
 
     asked_hz: dict[str, float]
@@ -190,6 +192,7 @@ class Flown(NamedTuple):
     estimate_age_s: np.ndarray
     most_backlog_s: float
     error_m: float
+    velocity_error_m_s: float
     damaged: Counter[str]
     session: Session
 
@@ -244,8 +247,13 @@ class Flight:
         assert self._settled is not None
         received, written, dropped = (now - then for now, then in zip(self.counts(), self._settled, strict=True))
         told = [(t_s, m) for t_s, m in vehicle.received if m.msgname == "ODOMETRY" and t_s > SETTLED_S]
-        errors = [np.array([m.x, m.y]) - vehicle.truth_at(m.time_usec * 1e-6 - BOOT_S)[0][:2] for _, m in told]
+        truths = [vehicle.truth_at(m.time_usec * 1e-6 - BOOT_S) for _, m in told]
+        errors = [np.array([m.x, m.y]) - position[:2] for (_, m), (position, _) in zip(told, truths, strict=True)]
         away = np.array(errors).reshape(-1, 2)
+        moving = [
+            np.array(to_earth(rotation_from_quaternion(*m.q), m.vx, m.vy, m.vz)) - velocity
+            for (_, m), (_, velocity) in zip(told, truths, strict=True)
+        ]
         return Flown(
             {name: rate_hz for name, (_, rate_hz) in session.rates.plan.streams.items()},
             received / lasted_s,
@@ -256,6 +264,7 @@ class Flight:
             np.array([BOOT_S + t_s - m.time_usec * 1e-6 for t_s, m in told]),
             max(self._backlog) / (baud / 10),
             float(np.sqrt(np.mean(np.sum((away - away.mean(axis=0)) ** 2, axis=1)))) if len(away) else float("nan"),
+            float(np.sqrt(np.mean(np.sum(np.square(moving), axis=1)))) if moving else float("nan"),
             vehicle.damage + session.reception.counts,
             session,
         )

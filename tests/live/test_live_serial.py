@@ -32,6 +32,7 @@ def assert_it_fits(flown, baud):
     assert flown.received_bytes_s < 0.85 * baud / 10
     assert flown.written_bytes_s < 0.85 * baud / 10
     assert flown.error_m < 2.0
+    assert flown.velocity_error_m_s < 0.25
 
 
 @pytest.mark.parametrize("baud", BAUDS)
@@ -59,8 +60,8 @@ def test_a_slow_line_that_everything_is_asked_of_loses_frames_and_grows_old(flig
 @pytest.mark.real_time
 @pytest.mark.parametrize("baud", BAUDS)
 def test_a_real_line_carries_what_is_asked_of_it(flight, baud):
-    """Over a pseudo-terminal, of 11 s with the start. What a loaded machine loses is the benchmark's."""
+    """Over a pseudo-terminal. What a loaded machine loses is the benchmark's."""
     log, setup = flight
     flown = fly_over(baud, SimulatedVehicle(log), FLOWN_S, options_of(setup, baud))
     assert_it_fits(flown, baud)
-    assert flown.estimate_hz > 0.15 * min(50.0, plan(0, baud / 10, "odometry").estimate_hz)
+    assert flown.estimate_hz > 0.2 * min(50.0, plan(0, baud / 10, "odometry").estimate_hz)

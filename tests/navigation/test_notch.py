@@ -14,7 +14,7 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import of_inertial
 from flownav.navigation.told import NO_HEADING, Equipment, ImuSettings
 from flownav.sensors.sheets import InertialSheet
-from navigation_streams import circle, fly, navigate
+from navigation_streams import Flown, circle, fly, navigate
 
 ROTOR_HZ, BLADES_HZ, PERIOD_S = 24.0, 48.0, 0.01
 TOLD = NavigatorSettingsFile().settings(Equipment(True, False, NO_HEADING, False, -np.inf))
@@ -117,6 +117,49 @@ def test_a_navigator_that_is_told_the_rotor_flies_as_if_it_did_not_shake():
     calm, untold, freed = rms(navigate(flown)), rms(navigate(shaky)), rms(navigate(shaky, **keys))
     assert untold > 2.0 * calm
     assert freed < calm + 0.25 * (untold - calm)
+
+
+def rms_velocity(flown: Flown, after_s: float, **keys: Any) -> float:
+    result = navigate(flown, **keys)
+    return float(np.sqrt(np.mean(result.velocity_error[result.t_s > after_s] ** 2)))
+
+
+def shaken_flight(every: int, duration_s: float = 20.0) -> Flown:
+    """Laps in a vehicle that shakes, of whose inertial readings (100 Hz) every such one arrives."""
+    flown = fly(circle, duration_s)
+    imu = flown.streams[Sensor.IMU]
+    value, kept = imu.value.copy(), slice(None, None, every)
+    value[:, 3:6] += shaken(imu.t_s, 0.01)
+    names = ("t_s", "variance", "quality")
+    return flown.changed(Sensor.IMU, value=value[kept], **{name: getattr(imu, name)[kept] for name in names})
+
+
+@pytest.mark.parametrize("every", [1, 2, 3, 4])
+def test_fewer_readings_than_the_sheets_rate_are_no_worse_off_with_the_notches(every: int):
+    """50 readings a second, as a serial line carries, show the blades at 2 Hz: a notch there takes the vehicle's own
+    motion, and gravity near it (2 m/s of vertical velocity).
+    """
+    flown = shaken_flight(every)
+    told = rms_velocity(flown, 5.0, notch_rotor_hz=ROTOR_HZ, notch_blades_hz=BLADES_HZ)
+    assert told < 1.1 * rms_velocity(flown, 5.0)
+
+
+@pytest.mark.parametrize("tone_hz", np.arange(10.0, 210.0, 10.0))
+def test_gravity_passes_at_every_rate(tone_hz: float):
+    m, left = ToneMemory(), (0.0, 0.0, 0.0)
+    for _ in range(300):
+        m = heard_tones((0.3, -1.0, -9.8), left, m, 0.02, told(tone_hz, 2.0 * tone_hz))
+        left = (0.3 - m.taken_x, -1.0 - m.taken_y, -9.8 - m.taken_z)
+    assert left == pytest.approx((0.3, -1.0, -9.8), abs=1e-6)
+
+
+def test_a_tone_that_was_heard_fades_where_the_readings_become_fewer():
+    _, m = passed(HOVER + shaken(INSTANTS_S), told())
+    left = (0.3, -1.0, -9.8)
+    for _ in range(500):
+        m = heard_tones((0.3, -1.0, -9.8), left, m, 0.02, told())
+        left = (0.3 - m.taken_x, -1.0 - m.taken_y, -9.8 - m.taken_z)
+    assert left == pytest.approx((0.3, -1.0, -9.8), abs=1e-3)
 
 
 def test_the_sheets_rotor_is_told_at_the_frequency_at_which_it_is_read():

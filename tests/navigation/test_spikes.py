@@ -145,3 +145,15 @@ def test_one_spike_of_10_ms_in_a_hover_moves_nothing():
     assert len([e for e in spoilt.events("imu", "spike")]) == 1
     assert np.abs(spoilt.velocity_error - clean.velocity_error).max() < 0.02
     assert int(IMU_SPIKE) == 15
+
+
+@pytest.mark.parametrize("told", [{}, {"notch_rotor_hz": 24.0, "notch_blades_hz": 48.0}])
+@pytest.mark.parametrize("axis", [0, 4])
+def test_a_reading_that_no_unit_can_make_is_none_even_after_a_gap_where_no_jump_is_a_spike(axis, told):
+    flown = fly(still, 20.0).cut(Sensor.IMU, 8.0, 8.15)
+    imu = flown.streams[Sensor.IMU]
+    value = imu.value.copy()
+    value[np.searchsorted(imu.t_s, 8.15), axis] = 1e200
+    struck, calm = navigate(flown.changed(Sensor.IMU, value=value), **told), navigate(flown, **told)
+    late = struck.t_s > 10.0
+    assert np.sqrt(np.mean(struck.velocity_error[late] ** 2)) < 0.01 + np.sqrt(np.mean(calm.velocity_error[late] ** 2))

@@ -14,7 +14,7 @@ from flownav.navigation.motion_records import (
     SteadyForce,
     ToneMemory,
 )
-from flownav.navigation.notch import heard_tones
+from flownav.navigation.notch import heard_tones, is_notched
 from flownav.navigation.records import Reading, StartMemory
 from flownav.navigation.tape import IMU_LOST
 from flownav.navigation.told import ImuSettings
@@ -24,16 +24,22 @@ from flownav.navigation.vibration import followed_vibration, with_reading
 
 LEAST_STEP_S = 0.002  # chosen: half a period at 250 Hz; what is owed over less would be an acceleration of its own
 STEADY_S = 0.1  # chosen: of vibration at 24 Hz (the shipped rotor) a fifteenth is left
+BEYOND_ANY_UNIT = 1e4  # m/s2 and rad/s: chosen, five times what the widest shock sensor of an autopilot reads (200 g)
 with_motion = replacing(ImuMemory, "vibration", "gap")
 Motion = tuple[float, float, float, float, float, float]  # body rate [rad/s] and specific force [m/s2], body FRD
 
 
 @equation
 def sound(reading: Reading) -> bool:
-    """Whether an inertial reading is one: it arrived, and all of it is finite."""
-    gyro = reading.value_0 + reading.value_1 + reading.value_2
-    total = gyro + reading.value_3 + reading.value_4 + reading.value_5
-    return reading.arrived > 0.0 and reading.withheld == 0.0 and bool(np.isfinite(total))
+    """Whether an inertial reading is one: it arrived, and a unit can have read it."""
+    return reading.arrived > 0.0 and reading.withheld == 0.0 and is_possible(reading)
+
+
+@equation
+def is_possible(r: Reading) -> bool:
+    """Whether a unit can have read it, of which NaN is none: one square of 1e200 would make what follows infinite."""
+    turning = abs(r.value_0) + abs(r.value_1) + abs(r.value_2)
+    return turning + abs(r.value_3) + abs(r.value_4) + abs(r.value_5) < BEYOND_ANY_UNIT
 
 
 @equation
@@ -57,7 +63,7 @@ def without_tones(motion: Motion, m: ToneMemory) -> Motion:
 @equation
 def told_noise(least: float, power: float, s: ImuSettings) -> float:
     """Density of the accelerometer's noise [m/s2/sqrt(Hz)]: as told, or as what is left beside the tones shows."""
-    return larger(least, np.sqrt(power)) if s.notch_rotor_hz > 0.0 else least
+    return larger(least, np.sqrt(power)) if is_notched(s) else least
 
 
 @equation
@@ -133,7 +139,7 @@ def judge_motion(
     loses = now and not fresh and np.isfinite(m.read_s) and started
     held = without_tones(remembered(m), before)
     force = (reading.value_3, reading.value_4, reading.value_5)
-    tones = heard_tones(force, held[3:6], before, period_s if fresh else 0.0, s) if now else before
+    tones = heard_tones(force, held[3:6], before, period_s if fresh else 0.0, s) if now and is_notched(s) else before
     between = motion_between(held, without_tones(said_by(reading), tones), s.imu_integrates)
     moving = fresh and started
     p = paid(between[0], held[0], spent.gyro_x, owed.gyro_x, step_s, period_s, now, moving)

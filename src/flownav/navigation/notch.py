@@ -14,24 +14,27 @@ import math
 from typing import NamedTuple
 
 from flownav.core.compile import clamp, cos, equation, exp, sin
+from flownav.core.frames import turned_level, within_half_turn
 from flownav.navigation.motion_records import ToneMemory
 from flownav.navigation.told import ImuSettings
+from flownav.navigation.vibration import FOLLOWING_S
 
+LEAST_NOTCH_HZ = 8.0  # chosen: a notch below would take the vehicle's own motion
 WIDTH = 6.0  # f over the width at -3 dB; chosen: 2 and 4 take more of a touchdown's jolt (test_notch)
 SPEED_S = 1.0  # chosen: the rotor's speed is found in seconds, and a governor moves it slower
 MOST_OFF = 0.1  # chosen: a tone further off is another rotor's
 LEAST_TONE_M_S2 = 0.1  # chosen: a weaker tone tells no speed
 STEADY_S = 0.03  # chosen: 0.3 takes a sway of 1 m/s2 at 1 Hz for noise, three times too much (test_notch)
-ROUGH_S = 1.0  # as `vibration.FOLLOWING_S`: chosen
 Force = tuple[float, float, float]  # specific force [m/s2], body FRD
 
 
 class Turn(NamedTuple):
-    """How far a tone turns in a step, and how much of what is read draws its phasor."""
+    """How far a tone turns in a step, how much of what is read draws its phasor, and how much of the phasor stays."""
 
     cosine: float
     sine: float
     share: float
+    kept: float
 
 
 class Tone(NamedTuple):
@@ -54,16 +57,30 @@ class Freed(NamedTuple):
 
 
 @equation
+def is_notched(s: ImuSettings) -> bool:
+    """Whether a tone is told."""
+    return s.notch_rotor_hz > 0.0 or s.notch_blades_hz > 0.0
+
+
+@equation
 def turn_of(tone_hz: float, dt_s: float) -> Turn:
-    """A tone of 0 Hz is none: it takes nothing."""
+    """A tone of 0 Hz is none: it takes nothing.
+
+    Nor does one that readings so far apart show below LEAST_NOTCH_HZ, as a line of 50 readings a second shows 48 Hz at
+    2 Hz: it is the vehicle's own motion, and at 0 Hz gravity. Its phasor turns on over a lost reading, and fades.
+    """
     angle = 2.0 * math.pi * tone_hz * dt_s
-    return Turn(cos(angle), sin(angle), 1.0 - exp(-angle / WIDTH))
+    read_angle = abs(within_half_turn(angle))
+    drawn = read_angle >= 2.0 * math.pi * LEAST_NOTCH_HZ * dt_s
+    share = 1.0 - exp(-read_angle / WIDTH)
+    return Turn(cos(angle), sin(angle), share if drawn else 0.0, 1.0 if drawn else SPEED_S / (SPEED_S + dt_s))
 
 
 @equation
 def turned(tone: Tone, by: Turn) -> Tone:
     """A phasor a step later."""
-    return Tone(by.cosine * tone.real - by.sine * tone.across, by.sine * tone.real + by.cosine * tone.across)
+    real, across = turned_level(by.kept * tone.real, by.kept * tone.across, by.cosine, by.sine)
+    return Tone(real, across)
 
 
 @equation
@@ -96,7 +113,7 @@ def followed_density(power: float, change: float, before: float, dt_s: float) ->
     and little of the vehicle's motion.
     """
     bend = change - before
-    return power + dt_s / (ROUGH_S + dt_s) * (bend * bend * dt_s / 6.0 - power)
+    return power + dt_s / (FOLLOWING_S + dt_s) * (bend * bend * dt_s / 6.0 - power)
 
 
 @equation

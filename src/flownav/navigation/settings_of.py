@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from flownav.core.frames import GRAVITY_M_S2
 from flownav.core.parameter_files import check
-from flownav.navigation.notch import WIDTH
+from flownav.navigation.notch import LEAST_NOTCH_HZ, WIDTH
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
 from flownav.sensors.barometer import BarometerSheet
@@ -26,7 +26,6 @@ BIAS_LIMIT_SIGMAS = 3.0  # a limit leaves room for all but 3 in 1000 units; chos
 VIBRATION_MARGIN = 2.0  # chosen, not measured: what is beyond twice the stated vibration, the sheet does not know
 # slower motion is held by what aids the IMU: level velocity errs by 1.17 of what is stated with 2, by 1.02 with 4
 AIDED_HZ = 3.0
-LEAST_NOTCH_HZ = 8.0  # chosen: a notch below would take the vehicle's own motion
 NOTCHED = ("level_m_s2", "vertical_m_s2")
 # what a unit that integrates leaves out of the position; with 0.01, the default, w errs by 0.7 of what is stated at
 # `approach`, with this by 1.0
@@ -186,7 +185,7 @@ def _notches(sheet: InertialSheet, rotor_hz: tuple[float, float] | None) -> Keys
     return {
         key: read_hz
         for key, tone, hz in tones
-        if (tone.level_m_s2 or tone.vertical_m_s2) and (read_hz := _read_hz(hz, float(sheet.rate_hz))) > LEAST_NOTCH_HZ
+        if (tone.level_m_s2 or tone.vertical_m_s2) and (read_hz := _read_hz(hz, float(sheet.rate_hz))) >= LEAST_NOTCH_HZ
     }
 
 

@@ -13,6 +13,7 @@ from flownav.estimation.laws import component
 from flownav.estimation.named import Attitude, PositionNed, rotation_by
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, POSITION, RATE, VELOCITY
 from flownav.navigation.course import with_sought
+from flownav.navigation.inertial import is_possible
 from flownav.navigation.lagged_flow import start_lag
 from flownav.navigation.memory import MEMORY
 from flownav.navigation.motion_records import ImuMemory, SteadyForce
@@ -122,9 +123,7 @@ class Levelled(NamedTuple):
 @on_lanes
 def note_force(reading: Reading, m: StartMemory, imu: ImuMemory, *, t_s: float) -> Levelled:
     """The latest inertial reading before the start, and the mean specific force."""
-    gyro = reading.value_0 + reading.value_1 + reading.value_2
-    finite = bool(np.isfinite(gyro + reading.value_3 + reading.value_4 + reading.value_5))
-    noted = m.started == 0.0 and reading.arrived > 0.0 and finite
+    noted = m.started == 0.0 and reading.arrived > 0.0 and is_possible(reading)
     return Levelled(levelled(reading, m, t_s) if noted else m, with_reading(reading, t_s, imu) if noted else imu)
 
 

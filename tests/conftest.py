@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from pathlib import Path
 
 import hypothesis
 import pytest
 
+import command_tree
 import compile_once
 from places import SHARED
 
@@ -17,8 +19,18 @@ hypothesis.settings.register_profile("flownav", UNHURRIED, derandomize=True)  # 
 hypothesis.settings.register_profile("random", UNHURRIED)  # `make test-random` draws anew
 hypothesis.settings.load_profile("flownav")
 
+# thousands of tests and all that they import stay until the end: Python need not look for garbage among them each time
+gc.set_threshold(50_000, 20, 20)
+command_tree.keep()
+
 if "PYTEST_XDIST_WORKER" in os.environ:
     compile_once.begin()
+
+
+def pytest_collection_finish() -> None:
+    """What is collected is no garbage: left out of every later search."""
+    gc.collect()
+    gc.freeze()
 
 
 def _folder(variable: str, name: str) -> Path:

@@ -28,6 +28,12 @@ def flown(request):
 
 
 @pytest.fixture(scope="module")
+def landed():
+    """One landing, which nobody changes."""
+    return flownav.fly("landing", seed=4)
+
+
+@pytest.fixture(scope="module")
 def replayed(tmp_path_factory):
     log = log_of_flight(40.0)
     folder = log.write(tmp_path_factory.mktemp("log") / "garden")
@@ -79,22 +85,20 @@ def test_the_truth_itself_has_no_error(flown):
         assert parts["guidance_m"] == pytest.approx(scores["touchdown"]["contact"]["distance_m"])
 
 
-def test_a_drift_before_the_touchdown_is_the_estimates_part():
-    record = flownav.fly("landing", seed=4)
-    contact_s = record.scores["touchdown"]["contact"]["t_s"]
-    ramp = np.clip((record.truth["t_s"] - 6.0) / (contact_s - 6.0), 0.0, 1.0)
-    drifting = {**record.truth, "pos_n_m": record.truth["pos_n_m"] + 0.5 * ramp}
-    parts = record.rescore(estimate=drifting).scores["touchdown"]["limited_by"]
+def test_a_drift_before_the_touchdown_is_the_estimates_part(landed):
+    contact_s = landed.scores["touchdown"]["contact"]["t_s"]
+    ramp = np.clip((landed.truth["t_s"] - 6.0) / (contact_s - 6.0), 0.0, 1.0)
+    drifting = {**landed.truth, "pos_n_m": landed.truth["pos_n_m"] + 0.5 * ramp}
+    parts = landed.rescore(estimate=drifting).scores["touchdown"]["limited_by"]
     assert parts["estimate_m"] == pytest.approx(0.5, abs=1e-9)
     assert parts["pad_m"] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_an_estimate_counted_from_the_handover_loses_its_offset_in_place_and_nothing_else():
-    record = flownav.fly("landing", seed=4)
-    shifted = {**record.flown, **{name: record.flown[name] + 2.0 for name in POSITION_NED}}
-    found = record.rescore(estimate=shifted, from_handover=True).scores
-    assert found["max_position_error_m"] == pytest.approx(record.scores["max_position_error_m"], abs=1e-9)
-    assert found["states"]["u"] == record.scores["states"]["u"]
+def test_an_estimate_counted_from_the_handover_loses_its_offset_in_place_and_nothing_else(landed):
+    shifted = {**landed.flown, **{name: landed.flown[name] + 2.0 for name in POSITION_NED}}
+    found = landed.rescore(estimate=shifted, from_handover=True).scores
+    assert found["max_position_error_m"] == pytest.approx(landed.scores["max_position_error_m"], abs=1e-9)
+    assert found["states"]["u"] == landed.scores["states"]["u"]
 
 
 def test_positions_alone_are_scored_and_the_rest_is_null(flown):
@@ -113,18 +117,17 @@ def test_another_rate_is_scored_at_the_truths_instants(flown):
         assert theirs["rms_error"] == pytest.approx(ours["rms_error"], abs=0.02)
 
 
-def test_what_an_estimate_does_not_cover_does_not_count():
-    record = flownav.fly("landing", seed=4)
-    early = record.flown["t_s"] <= 12.0
-    part = {name: values[early] for name, values in record.flown.items()}
-    error = record.flown["pos_n_m"] - record.truth["pos_n_m"]
-    counted = (record.judging["counted"] > 0.0) & early
-    found = record.rescore(estimate=part).scores
+def test_what_an_estimate_does_not_cover_does_not_count(landed):
+    early = landed.flown["t_s"] <= 12.0
+    part = {name: values[early] for name, values in landed.flown.items()}
+    error = landed.flown["pos_n_m"] - landed.truth["pos_n_m"]
+    counted = (landed.judging["counted"] > 0.0) & early
+    found = landed.rescore(estimate=part).scores
     assert found["states"]["x"]["rms_error"] == pytest.approx(np.sqrt(np.mean(error[counted] ** 2)), rel=1e-12)
     parts = found["touchdown"]["limited_by"]
     assert (parts["estimate_m"], parts["guidance_m"]) == (None, None), "it says nothing of the touchdown"
-    assert parts["pad_m"] == record.scores["touchdown"]["limited_by"]["pad_m"]
-    assert found["touchdown"]["contact"] == record.scores["touchdown"]["contact"]
+    assert parts["pad_m"] == landed.scores["touchdown"]["limited_by"]["pad_m"]
+    assert found["touchdown"]["contact"] == landed.scores["touchdown"]["contact"]
 
 
 # -- replays ----------------------------------------------------------------------------------------------------------
@@ -205,10 +208,9 @@ def columns(**changes):
         (np.zeros((5, 4)), "ndarray is given; a mapping of columns, or a data frame"),
     ],
 )
-def test_a_wrong_estimate_is_one_line(estimate, message):
-    record = flownav.fly("landing", seed=4)
+def test_a_wrong_estimate_is_one_line(landed, estimate, message):
     with pytest.raises(InputError) as caught:
-        record.rescore(estimate=estimate)
+        landed.rescore(estimate=estimate)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 

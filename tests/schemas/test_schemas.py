@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import jsonschema
@@ -28,10 +29,22 @@ FILES = {
 }
 
 
-@pytest.mark.parametrize("name", names())
-def test_a_schema_is_one_and_carries_its_number(name):
+@cache
+def validator(name: str) -> jsonschema.Draft202012Validator:
+    """Of a schema, which is looked through once."""
     found = schema_of(name)
     jsonschema.Draft202012Validator.check_schema(found)
+    return jsonschema.Draft202012Validator(found)
+
+
+def require_fit(entries: object, name: str) -> None:
+    """ValidationError where these are not as the schema says."""
+    validator(name).validate(entries)
+
+
+@pytest.mark.parametrize("name", names())
+def test_a_schema_is_one_and_carries_its_number(name):
+    found = validator(name).schema
     assert found["$id"] == f"urn:flownav:schema:{name}:1"
 
 
@@ -43,15 +56,15 @@ def test_what_ships_is_what_the_models_are(name):
 @pytest.mark.parametrize(("name", "file"), [(name, file) for name, files in FILES.items() for file in files])
 def test_files_that_ship_fit_and_a_misspelt_key_does_not(name, file):
     entries = tomllib.loads(shipped(f"{file}.toml").read_text(encoding="utf-8"))
-    jsonschema.validate(entries, schema_of(name))
+    require_fit(entries, name)
     with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(entries | {"misspelt_key": 1}, schema_of(name))
+        require_fit(entries | {"misspelt_key": 1}, name)
 
 
 def test_settings_fit():
-    jsonschema.validate({"flow_gain_x": 1.1}, schema_of("file-settings"))
+    require_fit({"flow_gain_x": 1.1}, "file-settings")
     with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate({"flow_gain_x": "1.1"}, schema_of("file-settings"))
+        require_fit({"flow_gain_x": "1.1"}, "file-settings")
 
 
 def test_schemas_of_commands_are_of_commands():
@@ -98,14 +111,14 @@ def printed(folder: Path, *arguments: str):
 ], ids=" ".join)  # fmt: skip
 def test_what_a_command_prints_fits_its_schema(folder, arguments):
     found = printed(folder, *arguments)
-    jsonschema.validate(found, schema_of(arguments[0]))
+    require_fit(found, arguments[0])
     with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(found | {"schema": 2}, schema_of(arguments[0]))
+        require_fit(found | {"schema": 2}, arguments[0])
 
 
 def test_a_records_manifest_fits(folder):
     manifest = json.loads(json.dumps(Record.load(folder / "r.fnr").manifest))
-    jsonschema.validate(manifest, schema_of("record-manifest"))
+    require_fit(manifest, "record-manifest")
 
 
 def test_every_command_that_prints_an_object_has_a_schema():
@@ -117,16 +130,16 @@ def test_every_command_that_prints_an_object_has_a_schema():
 def test_a_flight_fits(folder):
     for more in ((), ("--flights", "2"), ("--filter", "paper")):
         found = printed(folder, "fly", "landing", "--no-report", *more)
-        jsonschema.validate(found, schema_of("fly"))
+        require_fit(found, "fly")
 
 
 def test_a_certificate_and_what_certify_prints_fit(folder):
     found = printed(
         folder, "certify", "approach", "--flights", "16", "--ranking", "0", "--records", "0", "--out", "cert"
     )
-    jsonschema.validate(found, schema_of("certify"))
+    require_fit(found, "certify")
     written = json.loads((folder / "cert" / "certificate.json").read_text(encoding="utf-8"))
-    jsonschema.validate(written, schema_of("certificate"))
+    require_fit(written, "certificate")
     assert written["schema"] == 1
 
 

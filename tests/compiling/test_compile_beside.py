@@ -23,6 +23,7 @@ def shift(p, n):
         p[i] = p[i] + 1.0
 
 SHIFT = unit(shift, "p", n=2)
+OTHER = unit(shift, "p", n=3)
 
 @kernel
 def apply(take, p):
@@ -32,20 +33,27 @@ def apply(take, p):
 PROGRAM = """
 import os, sys
 import numpy as np
-from flownav.core.compile import announce_compilation, compile_beside
+from flownav.core.compile import announce_compilation, begin_beside, compile_beside, meanwhile
+from flownav.core.compiling import beside
 from flownav.core.compiling.cache import STORE
 from parts import SHIFT, apply
 
 os.sched_getaffinity = lambda pid: set(range(int(os.environ.get("CORES", "2"))))
 sys.executable = os.environ.get("OTHER", sys.executable)
 p = np.array([3.0, 4.0])
-with announce_compilation("test"):
+early = os.environ.get("BEGIN", "")
+if early:
+    begin_beside("parts", early)
+begun = list(beside._begun.values())
+done = []
+with meanwhile(lambda: done.append("meanwhile")), announce_compilation("test"):
     compile_beside(SHIFT, apply, 0, p, whole=os.environ.get("WHOLE", ""))
     made = "elsewhere" if not SHIFT.is_ready and STORE.holds(SHIFT.file_name()) else "here"
     apply(SHIFT.address, p)
-print(*p, made)
+print(*p, made, *(done if early else ()), *("begun" for one in begun if one.poll() is not None))
 """
 SIDE_BY_SIDE = ["flownav: compiling shift (1 of 2) ...", "flownav: compiling shift, apply (1 of 2) ..."]
+TWO = ["flownav: compiled 2 kernels"]
 ONE_BY_ONE = ["flownav: compiling shift ...", "flownav: compiling apply ..."]
 
 
@@ -90,6 +98,21 @@ def test_both_are_compiled_side_by_side_and_only_once(place):
     assert len(list((place / "cache" / "kernels").glob("*.kernel"))) == 2
     assert run(place) == ("7.0 5.0 elsewhere", [])
     assert left_over(place) == []
+
+
+def test_a_unit_is_begun_before_it_is_asked_for_where_nothing_has_been_compiled(place):
+    assert run(place, BEGIN="SHIFT") == ("7.0 5.0 elsewhere meanwhile begun", [*SIDE_BY_SIDE, *TWO])
+    assert run(place, BEGIN="SHIFT") == ("7.0 5.0 elsewhere", [])
+    assert left_over(place) == []
+
+
+def test_a_unit_that_was_begun_and_is_not_needed_is_given_up(place):
+    assert run(place, BEGIN="OTHER") == ("7.0 5.0 elsewhere meanwhile begun", [*SIDE_BY_SIDE, *TWO])
+    assert left_over(place) == []
+
+
+def test_one_core_begins_nothing(place):
+    assert run(place, BEGIN="SHIFT", CORES="1")[0] == "7.0 5.0 here"
 
 
 def test_one_core_compiles_one_after_the_other(place):

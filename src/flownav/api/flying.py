@@ -13,12 +13,15 @@ from flownav.api.scenario import Scenario, scenario_of
 from flownav.api.vehicle import Vehicle
 from flownav.campaigns.judged import BOUND_FLIGHTS, Judged, bound_of, consistency_facts, fly_judged
 from flownav.campaigns.local import fly_recorded, known_exactly, median_flight, score_history
+from flownav.core.compile import meanwhile
 from flownav.core.errors import InputError, arg
 from flownav.core.provenance import called_as
+from flownav.core.record_file import load_libraries
 from flownav.parts.flying import fly_parts, fly_with, names_of
 from flownav.parts.protocols import Controller, Filter, Parts, SensorModel, VehicleModel
 from flownav.scoring.errors import percentile_of_paper, published, scores_of_flights
 from flownav.scoring.landings import takeoff_of_flights
+from flownav.scoring.touchdown import load_kernel
 from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.engine import fly_one
 from flownav.simulation.ensemble import Ensemble
@@ -108,9 +111,18 @@ def fly_setup(
         return _fly_pixels(setup, seed, first, flights, truths, facts, advance)
     if flights > 1:
         return _fly_many(setup, seed, flights, truths, facts, advance)
-    record = Record.of(fly_recorded(setup, seed, first, truths))
+    with meanwhile(_get_ready_to_save):
+        record = Record.of(fly_recorded(setup, seed, first, truths))
     advance(1)
     return Flights(record, first, facts | _nothing_of_many(setup) | record.scores)
+
+
+def _get_ready_to_save() -> None:
+    """What scoring and saving a flight load: a second, which a first flight has while it waits for a kernel."""
+    import flownav.report.html  # noqa: F401
+
+    load_kernel()
+    load_libraries()
 
 
 def _facts(setup: Setup, seed: int, flights: int, *, dispersed: bool) -> dict[str, Any]:

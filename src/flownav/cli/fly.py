@@ -50,6 +50,10 @@ def command(
     as_json: options.Json = False,
 ) -> None:
     """Fly a scenario: the table of errors beside Table 5 or 6, touchdown, the record and its report."""
+    from flownav.core.compile import begin_beside
+
+    if filter_name is None and flights == 1:
+        begin_beside("flownav.navigation.take", "navigate_one")
     from flownav.api.calls import split
     from flownav.api.flying import MOST_FLIGHTS, fly_setup
     from flownav.api.scenario import Scenario

@@ -20,7 +20,7 @@ number of threads.
 from collections.abc import Callable
 from typing import Any
 
-from flownav.core.compiling.beside import compile_beside
+from flownav.core.compiling.beside import begin_beside, compile_beside, meanwhile
 from flownav.core.compiling.bundles import (
     FlatAccess,
     columns_of,

@@ -88,6 +88,14 @@ def save(manifest: dict[str, Any], tables: Tables, path: Path, *, replacing: boo
             pa.default_memory_pool().release_unused()
 
 
+def load_libraries() -> None:
+    """Load what `save` needs, with pandas, of which pyarrow asks at its first table."""
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    pa.table({"t_s": np.zeros(1)})
+
+
 def load(path: Path, newest: int, known: Mapping[str, tuple[str, ...]]) -> tuple[dict[str, Any], Tables]:
     """A record's manifest and tables. newest: the schema that is understood. known: columns by table.
 

@@ -195,6 +195,13 @@ def touchdowns(
     return np.ascontiguousarray(rows.T)
 
 
+def load_kernel() -> None:
+    """Load or compile what `touchdowns` needs: the touchdowns of one flight of one step."""
+    still = np.zeros((1, 1))
+    motion = Motion(**{name: np.zeros((1, 2, 1)) if name == "place_m" else still for name in Motion._fields})
+    touchdowns(np.zeros(1), motion, np.zeros((1, 2, 1)), still, still, Limits(*(0.0 for _ in Limits._fields)), 0.0)
+
+
 def _plain(values: Array) -> Array:
     """Numbers as the kernel takes them, whatever holds them."""
     return np.ascontiguousarray(values, float)

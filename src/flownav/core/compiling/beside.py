@@ -10,7 +10,7 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
@@ -21,6 +21,8 @@ from flownav.core.compiling.units import Unit
 
 PATIENCE_S = 300.0  # how long the other process may take when this one has done its part
 _one_at_a_time = threading.RLock()
+_in_between: list[Callable[[], object]] = []
+_begun: dict[tuple[str, str], subprocess.Popen[bytes]] = {}
 
 
 def compile_beside(unit: Unit, kernel: Any, *arguments: Any, whole: str = "") -> None:
@@ -36,9 +38,34 @@ def compile_beside(unit: Unit, kernel: Any, *arguments: Any, whole: str = "") ->
             return
         with PROGRESS.expect(2, whole), _compiling_elsewhere(unit.__name__, name) as other:
             kernel.prepare(*arguments)
+            for work in _in_between if other is not None else ():
+                work()
             if other is not None:
                 with suppress(subprocess.TimeoutExpired):
                     other.wait(PATIENCE_S)
+
+
+def begin_beside(module: str, name: str) -> None:
+    """Where nothing has ever been compiled, begin on a unit that will be needed before what needs it is imported.
+
+    `compile_beside` takes the process over; it ends with this one where nobody does.
+    """
+    if STORE.is_empty() and can_pay() and not _begun:
+        with suppress(OSError):
+            _begun[module, name] = _start((module, name))
+
+
+@contextmanager
+def meanwhile(work: Callable[[], object]) -> Iterator[None]:
+    """What this process does while it waits for the other one's unit, within the block: what is needed next anyway.
+
+    Where nothing is waited for it is not done.
+    """
+    _in_between.append(work)
+    try:
+        yield
+    finally:
+        _in_between.remove(work)
 
 
 def _are_both_missing(unit: Unit, kernel: Any, arguments: tuple[Any, ...]) -> bool:
@@ -67,10 +94,12 @@ def name_of(unit: Unit) -> tuple[str, str] | None:
 def _compiling_elsewhere(what: str, name: tuple[str, str]) -> Iterator[subprocess.Popen[bytes] | None]:
     """Another process that compiles a unit, or None where none can be had; it is gone after the block."""
     try:
-        other = _start(name)
+        other = _begun.pop(name, None) or _start(name)
     except OSError:
         yield None
         return
+    for unneeded in (_begun.popitem()[1] for _ in range(len(_begun))):
+        _end(unneeded)
     PROGRESS.begin(what)
     try:
         yield other

@@ -66,6 +66,10 @@ class Store:
         """Whether there is a file of that name, whatever is in it."""
         return (self.shipped / name).is_file() or (self.own / name).is_file()
 
+    def is_empty(self) -> bool:
+        """Whether nothing has been compiled yet."""
+        return not any(any(folder.glob(f"*{SUFFIX}")) for folder in (self.shipped, self.own))
+
     def is_writable(self) -> bool:
         """Whether what is saved would be kept."""
         try:

@@ -11,6 +11,7 @@ import pytest
 
 import command_tree
 import compile_once
+import rewrite_once
 from places import SHARED
 
 # a loaded machine draws slowly, and says nothing of the test by that
@@ -25,6 +26,12 @@ command_tree.keep()
 
 if "PYTEST_XDIST_WORKER" in os.environ:
     compile_once.begin()
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """A worker's share of what every worker needs, before it collects."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        rewrite_once.rewrite_share(session.config)
 
 
 def pytest_collection_finish() -> None:

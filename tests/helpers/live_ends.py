@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import copy
+import copyreg
 import math
 import random
+import struct
 from collections import deque
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 from flownav.core.measurement import Measurement, Sensor
@@ -182,3 +186,26 @@ class Wire:
     def close(self) -> None:
         self.link.close()
         self.socket.close()
+
+
+# -- a flight that several tests begin with ------------------------------------------------------------------
+copyreg.pickle(struct.Struct, lambda packing: (struct.Struct, (packing.format,)))  # pymavlink's messages hold them
+
+
+def copied(wire: Wire) -> Wire:
+    """A wire that goes on as this one does, and shares nothing with it but the messages that were heard."""
+    return copy.deepcopy(wire, {id(message): message for message in wire.heard})
+
+
+@cache
+def _flown(seconds: int, vehicle: type[Hover], keeper: type[Keeper], options: Options) -> Wire:
+    if seconds == 0:
+        return Wire(vehicle(), options, keeper())
+    return copied(_flown(seconds - 1, vehicle, keeper, options)).fly(1.0)
+
+
+def hovering(
+    seconds: int, vehicle: type[Hover] = Hover, keeper: type[Keeper] = Keeper, options: Options | None = None
+) -> Wire:
+    """A wire of one's own, whose vehicle has hovered undisturbed for so long: flown once, and copied."""
+    return copied(_flown(seconds, vehicle, keeper, options or Options()))

@@ -7,13 +7,12 @@ import pytest
 
 from flownav.core.measurement import Sensor
 from flownav.live.filtering import Keeper
-from flownav.live.options import Options
 from flownav.logs.mavlink import outgoing as say
 from flownav.navigation.tape import IMU_SPIKE
-from live_ends import GRAVITY, Hover, Wire, reading
+from live_ends import GRAVITY, Hover, hovering, reading
 
 HIGHRES_IMU = 105
-BEGIN_S = 10.0
+BEGIN_S = 10.0  # after what all of them begin with
 
 
 class Flagged(Keeper):
@@ -26,7 +25,10 @@ class Flagged(Keeper):
 
 
 class Glitching(Hover):
-    """`says(chance)` gives rate and force while `when(t_s)` holds."""
+    """`says(chance)` gives rate and force while `when(t_s)` holds; it never does before it is told when."""
+
+    def when(self, t_s):
+        return False
 
     def frames(self, t_s):
         frames = super().frames(t_s)
@@ -65,9 +67,9 @@ def noisy(chance):
     (during(1.0), steady(0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY)),
 ])  # fmt: skip
 def test_spikes_and_bursts_cost_a_tenth_of_a_metre_at_most_and_are_flagged(when, says, gps):
-    vehicle, keeper = Glitching(), Flagged()
+    wire = hovering(8, Glitching, Flagged)
+    vehicle, keeper = wire.vehicle, wire.session.keeper
     vehicle.when, vehicle.says = when, says
-    wire = Wire(vehicle, Options(), keeper).fly(8.0)
     vehicle.gps = gps
     wire.fly(8.0)
     told = wire.estimates(7.5)

@@ -30,7 +30,7 @@ from flownav.logs.mavlink.framing import coder
 from flownav.logs.mavlink.position_messages import LOCAL_FRD
 from flownav.logs.mavlink.signing import SignatureCheck
 from flownav.navigation.memory import PROTECTION
-from live_ends import HEIGHT_M, ORIGIN, START_S, UNIX_S, Hover, Wire, reading
+from live_ends import HEIGHT_M, ORIGIN, START_S, UNIX_S, Hover, Wire, hovering, reading
 
 KEY = bytes(range(32))
 
@@ -61,8 +61,20 @@ def assert_all_good(wire, at_least=1):
     assert all(is_good(message) for message in estimates)
 
 
-def test_the_estimate_is_sent_with_covariance_frames_and_the_vehicles_time(wires):
-    wire = wires().fly(8.0)
+def test_a_copied_session_goes_on_as_one_that_was_never_copied(wires):
+    """What most tests here begin with; another copy of it that flies otherwise in between changes nothing."""
+    whole, wire, other = wires().fly(6.0), hovering(4), hovering(4)
+    for _ in range(4):
+        other.fly(0.5, silent=True)
+        wire.fly(0.5)
+    assert (wire.frames, wire.heard_s) == (whole.frames, whole.heard_s)
+    assert wire.session.dropped == whole.session.dropped
+    assert wire.session.filtering.running.work.tobytes() == whole.session.filtering.running.work.tobytes()
+    assert other.session.reason == "stale"
+
+
+def test_the_estimate_is_sent_with_covariance_frames_and_the_vehicles_time():
+    wire = hovering(8)
     assert wire.session.reason == ""
     last = wire.estimates()[-1]
     assert_all_good(wire, at_least=200)
@@ -76,8 +88,8 @@ def test_the_estimate_is_sent_with_covariance_frames_and_the_vehicles_time(wires
     assert len({message.reset_counter for message in wire.estimates(4.0)}) == 1
 
 
-def test_streams_are_asked_for_and_timesync_is_answered_in_the_vehicles_time(wires):
-    wire = wires().fly(3.0)
+def test_streams_are_asked_for_and_timesync_is_answered_in_the_vehicles_time():
+    wire = hovering(3)
     asked = {int(m.param1) for m in wire.heard if m.msgname == "COMMAND_LONG" and m.command == 511}
     assert {105, 106} & asked  # sent again until it is acknowledged
     wire.send(bytes(wire.vehicle.mav.timesync_encode(0, 123).pack(wire.vehicle.mav)))
@@ -120,8 +132,8 @@ def test_malformed_packets_are_counted_and_change_nothing(wires):
     assert_all_good(wire, at_least=100)
 
 
-def test_values_that_cannot_be_never_reach_what_is_sent(wires):
-    wire = wires().fly(4.0)
+def test_values_that_cannot_be_never_reach_what_is_sent():
+    wire = hovering(4)
     mav, chance = wire.vehicle.mav, random.Random(2)
 
     def nonsense():
@@ -138,8 +150,8 @@ def test_values_that_cannot_be_never_reach_what_is_sent(wires):
     assert_all_good(wire, at_least=200)
 
 
-def test_a_flood_is_dropped_and_counted_and_memory_stays(wires):
-    wire = wires().fly(4.0)
+def test_a_flood_is_dropped_and_counted_and_memory_stays():
+    wire = hovering(4)
     mav = wire.vehicle.mav
     ahead_us = round((wire.vehicle.boot_s + wire.t_s) * 1e6)
     for k in range(2 * MOST_WAITING):
@@ -166,8 +178,8 @@ def test_a_second_autopilot_is_not_listened_to(wires):
     assert_all_good(wire, at_least=100)
 
 
-def test_a_stranger_with_the_vehicles_number_on_another_port_is_not_listened_to(wires):
-    wire = wires().fly(4.0)
+def test_a_stranger_with_the_vehicles_number_on_another_port_is_not_listened_to():
+    wire = hovering(4)
     stranger, forger = wire.another(), Hover(boot_s=777.0)
     wire.fly(2.0, beside=lambda: [stranger.send(frame) for frame in forger.frames(wire.t_s)])
     stranger.close()
@@ -201,8 +213,8 @@ def test_with_a_key_unsigned_forged_and_replayed_packets_are_rejected(wires):
     assert all(check.accepts(frame) for frame in wire.frames)
 
 
-def test_a_cable_pulled_for_thirty_seconds_stops_the_sending_and_it_goes_on_by_itself(wires):
-    wire = wires().fly(6.0)
+def test_a_cable_pulled_for_thirty_seconds_stops_the_sending_and_it_goes_on_by_itself():
+    wire = hovering(6)
     before = wire.estimates()[-1].reset_counter
     pulled = wire.t_s
     wire.fly(30.0, silent=True)
@@ -217,8 +229,8 @@ def test_a_cable_pulled_for_thirty_seconds_stops_the_sending_and_it_goes_on_by_i
     assert_all_good(wire)
 
 
-def test_a_short_silence_needs_no_new_start(wires):
-    wire = wires().fly(6.0)
+def test_a_short_silence_needs_no_new_start():
+    wire = hovering(6)
     jumps = wire.session.filtering.jumps
     wire.fly(1.0, silent=True)
     assert wire.session.reason == "stale"
@@ -227,8 +239,8 @@ def test_a_short_silence_needs_no_new_start(wires):
     assert wire.session.filtering.jumps == jumps
 
 
-def test_a_vehicle_that_reboots_is_navigated_anew(wires):
-    wire = wires().fly(6.0)
+def test_a_vehicle_that_reboots_is_navigated_anew():
+    wire = hovering(6)
     before = wire.estimates()[-1].reset_counter
     wire.vehicle.boot_s = 1.0 - wire.t_s
     wire.fly(6.0)
@@ -241,8 +253,8 @@ def test_a_vehicle_that_reboots_is_navigated_anew(wires):
 
 
 @pytest.mark.parametrize("jump_s", [1.5, 100.0, -1.0, -15.0])
-def test_a_clock_that_jumps_is_followed(wires, jump_s):
-    wire = wires().fly(6.0)
+def test_a_clock_that_jumps_is_followed(jump_s):
+    wire = hovering(6)
     wire.vehicle.boot_s += jump_s
     wire.fly(9.0)
     assert wire.session.reason == ""
@@ -251,8 +263,8 @@ def test_a_clock_that_jumps_is_followed(wires, jump_s):
 
 
 @pytest.mark.parametrize("stray_s", [1.9, 9.0, 5000.0, -9.0])
-def test_one_stamp_that_cannot_be_does_not_stop_it_for_long(wires, stray_s):
-    wire = wires().fly(5.0)
+def test_one_stamp_that_cannot_be_does_not_stop_it_for_long(stray_s):
+    wire = hovering(5)
     mav = wire.vehicle.mav
     stamp = round(max(0.0, wire.vehicle.boot_s + wire.t_s + stray_s) * 1e6)
     wire.send(bytes(mav.highres_imu_encode(stamp, 0, 0, -9.8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x3F).pack(mav)))
@@ -261,8 +273,8 @@ def test_one_stamp_that_cannot_be_does_not_stop_it_for_long(wires, stray_s):
     assert_all_good(wire)
 
 
-def test_without_any_horizontal_aid_it_stops_and_says_why(wires):
-    wire = wires().fly(5.0)
+def test_without_any_horizontal_aid_it_stops_and_says_why():
+    wire = hovering(5)
     wire.vehicle.gps = wire.vehicle.flow = False
     lost = wire.t_s
     wire.fly(7.0)
@@ -281,8 +293,8 @@ def test_the_limit_of_dead_reckoning_may_be_tighter(wires):
     assert wire.session.reason == "dead_reckoning"
 
 
-def test_without_its_imu_the_estimate_is_not_sent(wires):
-    wire = wires().fly(5.0)
+def test_without_its_imu_the_estimate_is_not_sent():
+    wire = hovering(5)
     wire.vehicle.imu = False
     wire.fly(2.0)
     assert wire.session.reason == "stale"
@@ -301,17 +313,16 @@ def shown(wire):
     return console.export_text()
 
 
-def test_while_a_fault_is_suspected_nothing_is_sent_and_the_screen_names_it(wires):
+def test_while_a_fault_is_suspected_nothing_is_sent_and_the_screen_names_it():
     """GPS drifts north at 2 m/s; flow, IMU and the receiver's own velocity say that the vehicle hovers."""
-    wire, told = wires(), {}
+    wire, told = hovering(12), {}
 
     def drift():
         wire.vehicle.north_m += 0.02
         if wire.session.reason == "fault_suspected" and not told:
             told.update(t_s=wire.t_s, screen=shown(wire))
 
-    assert "protection levels: none yet" in shown(wire)
-    wire.fly(12.0)
+    assert "protection levels: none yet" in shown(hovering(0))
     assert "suspected" not in shown(wire)
     wire.fly(12.0, beside=drift)
     assert "suspected: GPS drift north" in told["screen"]
@@ -324,7 +335,7 @@ def test_while_a_fault_is_suspected_nothing_is_sent_and_the_screen_names_it(wire
 
 def test_without_protection_nothing_is_sent(wires):
     """A level that is above the limit, and one that is no number."""
-    wire = wires().fly(5.0)
+    wire = hovering(5)
     on = wire.session.filtering.running
     level_m, t_s = float(on.work[PROTECTION]), on.clock_s
     assert f"protection levels: {level_m:.2f} m horizontal, {float(on.work[PROTECTION + 1]):.2f} m vertical" in shown(
@@ -359,8 +370,8 @@ def test_what_is_sent_is_what_was_asked_for(wires, send, names):
     assert wire.session.reason == {"vision": "", "none": "nothing_asked", "landing-target": "no_pad"}[send]
 
 
-def test_the_pad_is_told_once_it_was_seen(wires):
-    wire = wires(send="landing-target").fly(4.0)
+def test_the_pad_is_told_once_it_was_seen():
+    wire = hovering(4, options=Options(send="landing-target"))
     mav = wire.vehicle.mav
 
     def see():
@@ -391,8 +402,8 @@ def sees_the_pad(wire, system, component):
     return see
 
 
-def test_a_camera_with_a_component_of_its_own_is_heard(wires):
-    wire = wires(send="landing-target").fly(4.0)
+def test_a_camera_with_a_component_of_its_own_is_heard():
+    wire = hovering(4, options=Options(send="landing-target"))
     wire.fly(3.0, beside=sees_the_pad(wire, 1, CAMERA))
     assert wire.session.reason == ""
     last = [message for message in wire.heard if message.msgname == "LANDING_TARGET"][-1]
@@ -408,8 +419,8 @@ def test_a_camera_of_another_system_is_heard_where_it_is_named(wires):
         assert (wire.session.dropped.get("link: other_system", 0) > 100) is not heard
 
 
-def test_what_flownav_sent_itself_is_not_taken_when_it_comes_back(wires):
-    wire = wires(send="landing-target").fly(4.0)
+def test_what_flownav_sent_itself_is_not_taken_when_it_comes_back():
+    wire = hovering(4, options=Options(send="landing-target"))
     wire.fly(2.0, beside=sees_the_pad(wire, 1, say.ODOMETRY_COMPONENT))
     assert wire.session.reason == "no_pad"
 
@@ -487,7 +498,7 @@ def test_one_stream_that_stops_is_asked_for_again(wires):
 
 
 def test_quality_is_what_is_left_of_the_limits(wires):
-    wire = wires().fly(6.0)
+    wire = hovering(6)
     sure = wire.estimates()[-1].quality
     assert 50 < sure <= 100
     strict = wires(limits=Limits(protection_m=1.2 * float(wire.session.filtering.running.work[PROTECTION]))).fly(6.0)
@@ -513,8 +524,8 @@ def test_a_recorded_link_played_into_a_fresh_session_is_not_heard_beyond_the_pro
 
 # -- what a reviewer broke ---------------------------------------------------------------------------------
 @pytest.mark.parametrize("ahead_s", [0.5, 1.5, 5.0])
-def test_one_stamp_of_the_future_moves_nothing(wires, ahead_s):
-    wire = wires().fly(6.0)
+def test_one_stamp_of_the_future_moves_nothing(ahead_s):
+    wire = hovering(6)
     before = wire.t_s
     stamp_ms = round((wire.vehicle.boot_s + wire.t_s + ahead_s) * 1e3)
     seen = say.distance_sensor(wire.vehicle.mav, stamp_ms, reading(Sensor.RANGE, HEIGHT_M), (0.1, 40.0))

@@ -27,6 +27,7 @@ from flownav.navigation.packed import load_equipment, load_imu_settings
 AHEAD_NUMBERS = 13  # position NED [m], velocity NED [m/s], quaternion body to earth, body rate [rad/s]
 
 _strapdown = compiled(strapdown.law)
+_IN_MOTION = Signature.of(errors_in_motion.law)
 
 
 class Carried(NamedTuple):
@@ -128,13 +129,12 @@ def covariance_at(work: Array, t_s: float, position_walk_m_rt_s: float) -> Array
 
     The force, the attitude and the noise are those of the filter's last step.
     """
-    told = Signature.of(errors_in_motion.law)
-    held = {name: work[ROWS_BY_NAME[name]] for name in told.names if name not in PLACES}
+    held = {name: work[ROWS_BY_NAME[name]] for name in _IN_MOTION.names if name not in PLACES}
     dt_s = max(t_s - work[CLOCK], 0.0)
     covariance = unpack(work, ONE_LANE, 0, STATES)
     for _ in range(2):  # F P, and then F (F P)'
-        errors = held | {name: covariance[PLACES[name]] for name in told.names if name in PLACES}
-        records = [parameter.record(*(errors[name] for name in parameter.names)) for parameter in told.reads]
+        errors = held | {name: covariance[PLACES[name]] for name in _IN_MOTION.names if name in PLACES}
+        records = [parameter.record(*(errors[name] for name in parameter.names)) for parameter in _IN_MOTION.reads]
         for name, row in errors_in_motion.law(*records, dt_s=dt_s)._asdict().items():
             covariance[PLACES[name]] = row
         covariance = covariance.T

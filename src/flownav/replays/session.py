@@ -1,23 +1,24 @@
 """A replay: a log through the filter, its scores, and a table of GPS outages."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from flownav.core.compile import announce_compilation
 from flownav.core.errors import InputError, arg
-from flownav.core.measurement import Array, Sensor, Stream
+from flownav.core.measurement import Array, EventQueue, Sensor, Stream
 from flownav.core.record import POSITION_NED, Table
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
 from flownav.navigation.feed import SLOWEST_IMU_HZ, equipment_of
 from flownav.navigation.flags import flagged, flags_of
-from flownav.navigation.loop import Instead, run, start_navigator
+from flownav.navigation.loop import Instead, Running, run, start_navigator
 from flownav.navigation.rows import EstimateRow, InnovationRow
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.smoother import smooth
@@ -35,6 +36,7 @@ from flownav.scoring.reference import Alignment, OutageError
 
 HORIZONTAL = (*GPS, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
 LONGEST_TABLE = 2000  # chosen: a replay each, hours of them
+FED_BEYOND = 2048  # readings at a time after the end of what is asked for, until an estimate lies beyond it
 LEAST_WINDOW_S = 1e-6  # what rounding leaves of a window is none
 
 
@@ -190,14 +192,17 @@ def outage_table(
     windows: list[tuple[float, float]],
     on_progress: Callable[[int], object] = lambda done: None,
 ) -> list[OutageError]:
-    """One replay a window, each with GPS cut in that window alone. `on_progress` is called with 1 for each.
+    """One replay a window and no further, each with GPS cut in that window alone.
+
+    `on_progress` is called with 1 for each.
 
     InputError where a window lies outside the log.
     """
     check_windows(log, windows, arg("outage_table"))
 
     def error_of(window: tuple[float, float]) -> OutageError:
-        return _run(log, replace(options, gps_outages_s=(window,)), settings, prepared).outage(*window)
+        cut = replace(options, gps_outages_s=(window,))
+        return _run(log, cut, settings, prepared, until_s=window[1]).outage(*window)
 
     errors = []
     with announce_compilation("replay"), ThreadPoolExecutor(2) as pool:
@@ -235,9 +240,22 @@ def outage_summary(errors: list[OutageError]) -> dict[str, float | None]:
     return {"outage_median_rms_m": float(np.median(rms)), "outage_worst_rms_m": float(rms.max())}
 
 
+def _feed(parts: Iterable[EventQueue], on: Running, instead: int | None, until_s: float) -> None:
+    """Feed the parts of a queue, as far as it takes for estimates at every instant until `until_s`."""
+    for part in parts:
+        count = len(part.t_s)
+        ends = range(int(np.searchsorted(part.t_s, until_s, side="right")), count, FED_BEYOND)
+        for begin, end in pairwise([0, *ends, count]):
+            run(EventQueue._make(column[begin:end] for column in part), on, instead=instead)
+            if np.isfinite(until_s):
+                told_s = EstimateRow.of(written_on(on.tape).estimate).t_s
+                if len(told_s) > 1 and told_s[-1] > until_s:
+                    return
+
+
 def _run(
     log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, prepared: Prepared, *, smoothed: bool = False,
-    instead: Instead | None = None,
+    instead: Instead | None = None, until_s: float = float("inf"),
 ) -> Replay:  # fmt: skip
     path = None
     if log.fed:
@@ -248,8 +266,7 @@ def _run(
         tape = tape_for({sensor: len(stream) for sensor, stream in prepared.streams.items()}, last_s - first_s)
         running = start_navigator(equipment, settings, tape, options.flow_noise)
         address = None if instead is None else instead(running)
-        for part in prepared.parts():
-            run(withhold(log, part, options), running, instead=address)
+        _feed((withhold(log, part, options) for part in prepared.parts()), running, address, until_s)
         if smoothed:
             queue = withhold(log, prepared.queue, options)
             path = smooth(queue, start_navigator(equipment, settings, new_tape(queue), options.flow_noise))

@@ -183,6 +183,7 @@ def test_ctrl_c_is_exit_status_130(tmp_path):
     done = subprocess.Popen(
         [sys.executable, "-m", "flownav", "rig", "--runs", "200", "--out", "rig"],
         cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background ignores it
     )  # fmt: skip
     try:
         until_s = time.monotonic() + 120.0

@@ -38,8 +38,14 @@ def sound(reading: Reading) -> bool:
 @equation
 def is_possible(r: Reading) -> bool:
     """Whether a unit can have read it, of which NaN is none: one square of 1e200 would make what follows infinite."""
+    return size_of(r) < BEYOND_ANY_UNIT
+
+
+@equation
+def size_of(r: Reading) -> float:
+    """The sum of all six axes without their signs: 0 where each is, NaN where one is."""
     turning = abs(r.value_0) + abs(r.value_1) + abs(r.value_2)
-    return turning + abs(r.value_3) + abs(r.value_4) + abs(r.value_5) < BEYOND_ANY_UNIT
+    return turning + abs(r.value_3) + abs(r.value_4) + abs(r.value_5)
 
 
 @equation

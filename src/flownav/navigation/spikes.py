@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from flownav.core.compile import ONE_LANE, equation, kernel, larger, pointer, smaller
 from flownav.core.measurement import Array
 from flownav.estimation.states import ATTITUDE, VELOCITY
-from flownav.navigation.inertial import sound
+from flownav.navigation.inertial import size_of, sound
 from flownav.navigation.memory import MEMORY, READING, load_imu, load_spike, new_work, store_imu, store_spike
 from flownav.navigation.motion_records import ImuMemory, SpikeMemory
 from flownav.navigation.records import Reading, StartMemory
@@ -52,8 +52,7 @@ def distance(x: float, y: float, z: float) -> float:
 @equation
 def is_dead(r: Reading) -> bool:
     """Whether all six axes read 0 to the last digit, as no IMU does that is alive."""
-    turning = abs(r.value_0) + abs(r.value_1) + abs(r.value_2)
-    return turning + abs(r.value_3) + abs(r.value_4) + abs(r.value_5) == 0.0
+    return size_of(r) == 0.0
 
 
 @equation

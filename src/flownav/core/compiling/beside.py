@@ -98,8 +98,9 @@ def _compiling_elsewhere(what: str, name: tuple[str, str]) -> Iterator[subproces
     except OSError:
         yield None
         return
-    for unneeded in (_begun.popitem()[1] for _ in range(len(_begun))):
+    for unneeded in _begun.values():
         _end(unneeded)
+    _begun.clear()
     PROGRESS.begin(what)
     try:
         yield other

@@ -6,6 +6,11 @@ import gc
 import os
 from pathlib import Path
 
+# NumPy, which reads this as it is imported, multiplies on as many threads as there are cores: where the workers keep
+# the cores busy, those threads only wait for each other, and processor time is spent on that
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import hypothesis
 import pytest
 

@@ -5,27 +5,37 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from importlib.util import find_spec
 
 import pytest
 
-ASKED = [sys.executable, "-m", "flownav", "campaign", "landing", "--flights", "2", "--engine", "cuda"]
+from command import run
+
+ASKED = ["flownav", "campaign", "landing", "--flights", "2", "--engine", "cuda"]
 WITHOUT_DEVICE = os.environ | {"NUMBA_DISABLE_CUDA": "1", "CUDA_VISIBLE_DEVICES": ""}
 
 
-def complaint(tmp_path, *more):
-    done = subprocess.run(
-        [*ASKED, "--out", tmp_path / "campaign", *more], env=WITHOUT_DEVICE, capture_output=True, text=True
-    )
+def complaint(folder, done):
     assert done.returncode == 2
     assert done.stdout == ""
-    assert not (tmp_path / "campaign").exists()
+    assert not folder.exists()
     (line,) = done.stderr.strip().splitlines()
     return line
 
 
-@pytest.mark.parametrize("more", [[], ["--json"]], ids=["for people", "as JSON"])
-def test_no_device_is_one_line_that_says_what_to_do(tmp_path, more):
-    line = complaint(tmp_path, *more)
+@pytest.fixture(params=["in a process of its own", "as JSON"])
+def line(request, tmp_path, monkeypatch):
+    """For people as a driver without a device answers; as JSON where there is said to be none."""
+    folder = tmp_path / "campaign"
+    if request.param != "as JSON":
+        command = [sys.executable, "-m", *ASKED, "--out", folder]
+        return complaint(folder, subprocess.run(command, env=WITHOUT_DEVICE, capture_output=True, text=True))
+    if find_spec("numba_cuda") is not None:
+        monkeypatch.setattr("numba.cuda.is_available", lambda: False)
+    return complaint(folder, run(*ASKED[1:], "--out", folder, "--json", cwd=tmp_path))
+
+
+def test_no_device_is_one_line_that_says_what_to_do(line):
     assert "--engine cuda" in line
     assert "use --engine local" in line
     assert "no CUDA device was found" in line or "numba-cuda is not installed" in line

@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import device_cases
+from command import run
 from flownav.campaigns.measures import ROW_COLUMNS
 
 SIMULATED = os.environ | {"NUMBA_ENABLE_CUDASIM": "1", "PYTHONWARNINGS": "ignore"}
@@ -49,14 +50,16 @@ def test_flights_agree_with_the_cpu_to_a_billionth(simulated, case):
 def test_a_campaign_flies_there_and_keeps_the_rows_of_the_local_engine(tmp_path):
     asked = ["landing", "--flights", "2", "--truth-model", "matched", "--records", "0", "--json",
              "--set", "filter.name=paper", "--set", "flight.duration_s=0.4"]  # fmt: skip
+    there = subprocess.run(
+        [sys.executable, "-m", "flownav", "campaign", *asked, "--engine", "cuda", "--out", tmp_path / "cuda"],
+        env=SIMULATED, capture_output=True, text=True, timeout=600,
+    )  # fmt: skip
+    assert there.returncode == 0, there.stderr[-2000:]
+    here = run("campaign", *asked, "--engine", "local", "--out", tmp_path / "local", cwd=tmp_path)
+    assert here.returncode == 0, here.stderr[-2000:]
     rows = {}
-    for engine in ("cuda", "local"):
-        done = subprocess.run(
-            [sys.executable, "-m", "flownav", "campaign", *asked, "--engine", engine, "--out", tmp_path / engine],
-            env=SIMULATED, capture_output=True, text=True, timeout=600,
-        )  # fmt: skip
-        assert done.returncode == 0, done.stderr[-2000:]
-        assert json.loads(done.stdout)["flights"] == 2
+    for engine, said in (("cuda", there.stdout), ("local", here.stdout)):
+        assert json.loads(said)["flights"] == 2
         (part,) = (tmp_path / engine / "flights").rglob("*.parquet")
         rows[engine] = pq.read_table(part)
     assert rows["cuda"].column_names == rows["local"].column_names

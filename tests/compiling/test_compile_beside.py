@@ -7,12 +7,16 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from flownav.core.compiling import beside, closure
 from flownav.core.compiling.units import unit
+from forking import Nursery, nursery
 
 HUNG_S = 120.0  # whatever takes so long hangs
 PARTS = """
@@ -64,10 +68,25 @@ def place(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def started(place: Path, *command: str, **environment: str) -> subprocess.Popen[str]:
+@pytest.fixture(scope="module")
+def mother() -> Iterator[Nursery]:
+    with nursery() as running:
+        yield running
+
+
+@pytest.fixture
+def run(mother: Nursery) -> Callable[..., tuple[str, list[str]]]:
+    return partial(ran, mother)
+
+
+def environment_of(place: Path, more: dict[str, str]) -> dict[str, str]:
     paths = os.pathsep.join([str(closure.PACKAGE.parent), str(place)])
-    env = {**os.environ, "FLOWNAV_CACHE": str(place / "cache"), "PYTHONPATH": paths, **environment}
-    pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return {**os.environ, "FLOWNAV_CACHE": str(place / "cache"), "PYTHONPATH": paths, **more}
+
+
+def started(place: Path, *command: str, **environment: str) -> subprocess.Popen[str]:
+    env = environment_of(place, environment)
+    pipes: Any = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     return subprocess.Popen([sys.executable, "-B", *command], env=env, text=True, preexec_fn=interruptible, **pipes)
 
 
@@ -76,70 +95,69 @@ def interruptible() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def run(place: Path, **environment: str) -> tuple[str, list[str]]:
+def ran(mother: Nursery, place: Path, **environment: str) -> tuple[str, list[str]]:
     """What the program prints, and what it says of compilation without the time."""
-    with started(place, str(place / "program.py"), **environment) as program:
-        out, said = program.communicate()
-    assert program.returncode == 0, said
-    return out.strip(), [line.partition(" (test) in")[0] for line in said.splitlines()]
+    done = mother.run(place / "program.py", environment_of(place, environment))
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip(), [line.partition(" (test) in")[0] for line in done.stderr.splitlines()]
 
 
 def left_over(place: Path) -> list[Path]:
     return [path for path in (place / "cache").rglob("*") if path.is_file() and path.suffix not in (".kernel", ".json")]
 
 
-def test_what_both_are_together_is_said_once_in_words_for_people(place):
+def test_what_both_are_together_is_said_once_in_words_for_people(run, place):
     said = run(place, WHOLE="the simulator, once, about 30 s")[1]
     assert said == ["flownav: compiling the simulator, once, about 30 s ...", "flownav: compiled 2 kernels"]
 
 
-def test_both_are_compiled_side_by_side_and_only_once(place):
+def test_both_are_compiled_side_by_side_and_only_once(run, place):
     assert run(place) == ("7.0 5.0 elsewhere", [*SIDE_BY_SIDE, "flownav: compiled 2 kernels"])
     assert len(list((place / "cache" / "kernels").glob("*.kernel"))) == 2
     assert run(place) == ("7.0 5.0 elsewhere", [])
     assert left_over(place) == []
 
 
-def test_a_unit_is_begun_before_it_is_asked_for_where_nothing_has_been_compiled(place):
+def test_a_unit_is_begun_before_it_is_asked_for_where_nothing_has_been_compiled(run, place):
     assert run(place, BEGIN="SHIFT") == ("7.0 5.0 elsewhere meanwhile begun", [*SIDE_BY_SIDE, *TWO])
     assert run(place, BEGIN="SHIFT") == ("7.0 5.0 elsewhere", [])
     assert left_over(place) == []
 
 
-def test_a_unit_that_was_begun_and_is_not_needed_is_given_up(place):
+def test_a_unit_that_was_begun_and_is_not_needed_is_given_up(run, place):
     assert run(place, BEGIN="OTHER") == ("7.0 5.0 elsewhere meanwhile begun", [*SIDE_BY_SIDE, *TWO])
     assert left_over(place) == []
 
 
-def test_one_core_begins_nothing(place):
+def test_one_core_begins_nothing(run, place):
     assert run(place, BEGIN="SHIFT", CORES="1")[0] == "7.0 5.0 here"
 
 
-def test_one_core_compiles_one_after_the_other(place):
+def test_one_core_compiles_one_after_the_other(run, place):
     assert run(place, CORES="1") == ("7.0 5.0 here", [*ONE_BY_ONE, "flownav: compiled 2 kernels"])
 
 
-def test_what_is_in_the_cache_is_not_compiled_beside(place):
+def test_what_is_in_the_cache_is_not_compiled_beside(run, place):
     run(place)
     (kernel,) = (place / "cache" / "kernels").glob("*apply*")
     kernel.unlink()
     assert run(place)[1] == ["flownav: compiling apply ...", "flownav: compiled 1 kernel"]
 
 
-def test_without_a_cache_all_is_compiled_here(place):
+def test_without_a_cache_all_is_compiled_here(run, place):
     out, said = run(place, FLOWNAV_CACHE="/proc/flownav")
     assert out == "7.0 5.0 here"
     assert sum("are not kept in" in line for line in said) == 1
     assert [line for line in said if "compiling" in line] == ONE_BY_ONE
 
 
-def test_another_process_that_fails_costs_time_only(place):
+def test_another_process_that_fails_costs_time_only(run, place):
     out, said = run(place, OTHER="/bin/false")
     assert out == "7.0 5.0 here"
     assert said == [*SIDE_BY_SIDE, "flownav: compiling shift ...", "flownav: compiled 2 kernels"]
 
 
-def test_another_process_that_cannot_be_started_is_done_without(place):
+def test_another_process_that_cannot_be_started_is_done_without(run, place):
     assert run(place, OTHER=str(place / "none"))[0] == "7.0 5.0 here"
 
 

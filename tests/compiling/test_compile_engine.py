@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 from typing import NamedTuple
 
@@ -15,6 +14,7 @@ from flownav.core.compile import LANES, ONE_LANE, equation, kernel, pointer, pro
 from flownav.core.compiling import target
 from flownav.core.compiling.cache import STORE
 from flownav.core.compiling.engine import FEW_STEPS, MOST_SPARED
+from forking import nursery
 
 ROTATIONS = """
 import hashlib
@@ -157,40 +157,34 @@ def test_lanes_are_vectorised():
     assert "vmulpd" in code
 
 
+@pytest.fixture(scope="module")
+def rotations(tmp_path_factory):
+    """What the program prints with such an environment; each process compiles, or loads what one like it has kept."""
+    place = tmp_path_factory.mktemp("rotations")
+    program = place / "program.py"
+    program.write_text(ROTATIONS)
+
+    def run(**environment):
+        done = mother.run(program, {**os.environ, "FLOWNAV_CACHE": str(place / "cache"), **environment})
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    with nursery() as mother:
+        yield run
+
+
 @pytest.mark.parametrize("level", ["x86-64-v3", "host"])
-def test_every_level_gives_the_same_bits(level, tmp_path):
+def test_every_level_gives_the_same_bits(level, rotations):
     """Contraction is off, so no processor level rounds differently; one that this machine has not is not tried."""
     if level == "x86-64-v3" and target.level().name not in target.LEVELS:
         pytest.skip("this machine has no such level")
-    program = tmp_path / "program.py"
-    program.write_text(ROTATIONS)
-    ours, theirs = (
-        subprocess.run(
-            [sys.executable, str(program)],
-            env={**os.environ, "FLOWNAV_LEVEL": asked, "FLOWNAV_CACHE": str(tmp_path / "cache")},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
-        for asked in (target.level().name, level)
-    )
+    ours, theirs = (rotations(FLOWNAV_LEVEL=asked) for asked in (target.level().name, level))
     assert ours == theirs
     assert len(ours.split()) == 2
 
 
-def test_lean_and_plain_give_the_same_bits(tmp_path):
-    program = tmp_path / "program.py"
-    program.write_text(ROTATIONS)
-    ours, plain = (
-        subprocess.run(
-            [sys.executable, str(program)],
-            env={**os.environ, "FLOWNAV_PLAIN": asked, "FLOWNAV_CACHE": str(tmp_path / "cache")},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
-        for asked in ("", "1")
-    )
+def test_lean_and_plain_give_the_same_bits(rotations):
+    ours, plain = (rotations(FLOWNAV_PLAIN=asked) for asked in ("", "1"))
     assert ours == plain
 
 

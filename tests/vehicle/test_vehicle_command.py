@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from functools import cache
 
 import pytest
@@ -18,6 +19,7 @@ from flownav.vehicle.kinds import SHIPPED_VEHICLE
 from flownav.vehicle.linearize import load_paper_model
 from vehicle_files import X_CELL
 
+UNCERTAINTY = re.compile(r', uncertainty = (".*?"|[\d.e-]+)')
 APP = typer.Typer()
 APP.command()(command)
 
@@ -98,12 +100,19 @@ def test_margins_as_a_table_name_the_least_of_each_loop():
 
 
 def test_a_vehicle_without_margins_is_a_bad_verdict(tmp_path):
-    """Blades that can hardly be turned: their servos lag behind what the gains ask of them."""
+    """Blades that can hardly be turned: their servos lag behind what the gains ask of them.
+
+    Of its numbers only the mass is uncertain: 9 corners are looked at, where the shipped file has 123.
+    """
     path = tmp_path / "slow.toml"
     text = shipped(SHIPPED_VEHICLE).read_text(encoding="utf-8")
     assert text.count('value = 50.0, uncertainty = "36..60"') == 2
-    path.write_text(text.replace('value = 50.0, uncertainty = "36..60"', "value = 12.0"), encoding="utf-8")
+    text = text.replace('value = 50.0, uncertainty = "36..60"', "value = 12.0")
+    lines = [line if line.startswith("mass_kg") else UNCERTAINTY.sub("", line) for line in text.splitlines()]
+    path.write_text("\n".join(lines), encoding="utf-8")
     result = run("--margins", "--json", str(path))
     assert isinstance(result.exception, VerdictError)
     assert "less than 45 deg or 6 dB at a corner" in str(result.exception)
-    assert min(row["phase_deg"] for row in json.loads(result.stdout)["margins"] if row["phase_deg"] is not None) < 45.0
+    rows = json.loads(result.stdout)["margins"]
+    assert min(row["phase_deg"] for row in rows if row["phase_deg"] is not None) < 45.0
+    assert len({row["corner"] for row in rows}) == 9

@@ -113,6 +113,12 @@ def test_the_second_process_compiles_nothing(filled):
     assert filled.run() == ("7.0 5.0", [])
 
 
+def test_what_is_loaded_imports_nothing_that_only_compiling_needs(filled):
+    imported = "\n".join(filled.run(PYTHONVERBOSE="1")[1])
+    assert "import 'numba.core.dispatcher'" in imported
+    assert "import 'numba.np.linalg'" not in imported
+
+
 def test_a_remark_compiles_nothing(filled):
     filled.write_law(LAW.replace("Twice", "Doubled").replace("a remark", "another"))
     assert filled.run() == ("7.0 5.0", [])

@@ -203,6 +203,4 @@ def give_back_early() -> None:
                 (M_ARENA_MAX, 1),
             ):
                 mallopt(parameter, value)
-    import pyarrow
-
-    pyarrow.set_memory_pool(pyarrow.system_memory_pool())
+    os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")  # heard when Arrow is loaded

@@ -236,7 +236,7 @@ def largest_horizontal_error(estimate: Array, truth: Array, home: int | None, co
     estimate is counted from where the vehicle takes its pad to be. counted (epochs, lanes) 0/1: the steps that count;
     NaN of a flight without one.
     """
-    error = (estimate - truth)[:, :2]
+    error = estimate[:, :2] - truth[:, :2]
     relative = error if home is None else error - error[home]
     away = np.where(counted > 0.0, np.sqrt((relative**2).sum(axis=1)), -1.0).max(axis=0)
     return np.asarray(np.where(away >= 0.0, away, np.nan))

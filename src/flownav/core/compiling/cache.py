@@ -166,7 +166,6 @@ class KernelCache(_Cache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compiled function of this signature, or None: it must be compiled."""
-        target_context.refresh()
         name = self.file_name(sig)
         payload = STORE.load(name) if name is not None else None
         if name is None or payload is None:

@@ -33,6 +33,7 @@ from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.environment import lookup_environment
 from numba.core.registry import cpu_target
+from numba.core.runtime.nrt import rtsys
 
 from flownav.core.compiling.loops import has_loop, jumps_back
 from flownav.core.compiling.remembered import remembering
@@ -299,10 +300,13 @@ def rarely_collecting() -> Iterator[None]:
 
 @contextmanager
 def lean() -> Iterator[None]:
-    """Compile, load and link in this way inside the block, alone among threads."""
+    """Compile, load and link in this way inside the block, alone among threads.
+
+    Numba's registries of what it can compile (15 MB) are left to its compiler: what is loaded needs its runtime alone.
+    """
     with global_compiler_lock:
         context = cpu_target.target_context
-        context.refresh()
+        rtsys.initialize(context)
         before = context._internal_codegen
         context._internal_codegen = _codegen() if is_lean() else before
         try:

@@ -179,8 +179,8 @@ def test_a_storm_is_a_crash_and_not_a_landing():
 
 
 def test_a_rollover_after_a_soft_contact_is_a_crash():
-    """In 22 m/s some flights touch down below the limit of sink rate, slide and roll over; none of them has landed."""
-    storm = setup("landing", filter=PAPERS, wind={"speed_20ft_m_s": 22.0}).flight
+    """In 16 m/s some flights touch down below the limit of sink rate, slide and roll over; none of them has landed."""
+    storm = setup("landing", filter=PAPERS, wind={"speed_20ft_m_s": 16.0}).flight
     landings = touchdown_rows(fly_many(storm, 1, 64))
     rolled = landings[
         np.array(["rolled over" in names_of(bits) for bits in landings[:, TOUCHDOWN_COLUMNS.index("broken")]])

@@ -70,10 +70,7 @@ def test_settings_that_are_wrong_are_put_right_and_written(logs):
     facts = answer(logs / "long", "--out", "new/tuned.toml")
     assert (facts["verdict"], facts["file"]) == ("accepted", "new/tuned.toml")
     gain = proposed(facts)["flow_gain_x"]
-    reach = 0.5 * (gain["high"] - gain["low"])
-    assert (
-        gain["low"] - 0.5 * reach <= 0.85 <= gain["high"] + 0.5 * reach
-    )  # of one log; the interval holds 95 % of many
+    assert gain["value"] == pytest.approx(0.85, abs=0.03)  # errs by 0.011 rms over 16 seeds, as tune.md says of more
     assert gain["high"] - gain["low"] < 0.06
     assert facts["error_gain_nats"]["low"] > 0.0
     (log,) = facts["logs"]

@@ -26,14 +26,14 @@ ROLL_RAD_S, ROLL_INTEGRAL_1_S, ROLL_LEAD_S = 6.42, 0.647, 0.0700
 # heave: acceleration per collective; yaw: angular acceleration per pedal, both with the inflow frozen; heave was
 # searched with its own loop alone, yaw chosen by hand, as its search found nothing that keeps the box (control.md)
 HEAVE_RAD_S, HEAVE_INTEGRAL_1_S, HEIGHT_1_S = 9.3, 1.57, 1.7
-YAW_RATE_RAD_S, YAW_RATE_INTEGRAL_1_S, HEADING_1_S = 8.6, 1.67, 1.0
+YAW_RATE_RAD_S, YAW_RATE_INTEGRAL_1_S, HEADING_1_S = 12.0, 1.6, 1.5
 # position and velocity, with gusts felt by the accelerometer and without
 FELT = {
     "position_gain": 0.36, "forward_gain": 0.94, "forward_integral": 0.18, "right_gain": 1.40, "right_integral": 0.36,
     "gust_share": 1.0,
 }  # fmt: skip
 UNFELT = {
-    "position_gain": 0.50, "forward_gain": 0.65, "forward_integral": 0.05, "right_gain": 1.03, "right_integral": 0.14,
+    "position_gain": 0.50, "forward_gain": 0.64, "forward_integral": 0.05, "right_gain": 1.03, "right_integral": 0.14,
     "gust_share": 0.0,
 }  # fmt: skip
 GUST_FORWARD_S, GUST_RIGHT_S = 0.275, 0.19  # the disturbance observer's low-pass: it halves the drift to the right

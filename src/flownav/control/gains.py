@@ -15,7 +15,7 @@ class AutopilotGains(NamedTuple):
     gust_share: float = 0.0  # of the acceleration that the disturbance observer sees, what is answered with tilt
     gust_decay_forward: float = 0.0  # of the observer's low-pass over one period of the outer loop
     gust_decay_right: float = 0.0
-    tilt_limit: float = 0.20  # sine of the tilt against trim
+    tilt_limit: float = 0.35  # sine of the tilt against trim: 0.20 let 9 m/s of side wind carry it off (control.md)
     height_gain: float = 0.9  # [1/s]
     climb_limit_m_s: float = 1.5
     collective_gain: float = 0.010  # [rad/(m/s)]

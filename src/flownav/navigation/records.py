@@ -168,9 +168,9 @@ class NoiseMemory(NamedTuple):
 
 
 class WhitenessMemory(NamedTuple):
-    """A block of innovations along one body axis: since when [s], their sum in standard deviations, how many. The block
-    before, the mean square of blocks, and when it ended [s]; factor: how many times noisier than told the accelerometer
-    is along that axis.
+    """A block of innovations along one body axis: since when [s], their sum in standard deviations, how many. The mean
+    of the blocks before, the mean square of blocks, and when the last ended [s]; factor: how many times noisier than
+    told the accelerometer is along that axis.
     """
 
     since_s: float = 0.0

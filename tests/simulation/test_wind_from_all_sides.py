@@ -26,8 +26,8 @@ def flown(speed_m_s, from_deg):
         return headings_deg(history), touchdown_history(setup.flight, history)
 
     blocks = [judged for _, judged in fly_blocks(setup.flight, 1, 0, FLIGHTS, judge, None, setup.ensemble())]
-    headings, touchdowns = (np.concatenate(part, axis) for part, axis in zip(zip(*blocks, strict=True), (1, 0)))
-    return headings, touchdown_of_flights(touchdowns)
+    headings, touchdowns = zip(*blocks, strict=True)
+    return np.concatenate(headings, 1), touchdown_of_flights(np.concatenate(touchdowns))
 
 
 @pytest.mark.parametrize(("from_deg", "most_deg"), [(0.0, 10.0), (90.0, 12.0), (180.0, 30.0), (270.0, 12.0)])

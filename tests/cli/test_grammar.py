@@ -17,6 +17,7 @@ from command import run
 from flownav import cli
 from flownav.cli import app
 from flownav.cli import options as choices
+from forking import interruptible
 from places import DOCS
 
 APP = typer.main.get_command(app)
@@ -157,14 +158,14 @@ def test_the_version_is_printed(tmp_path):
 
 
 @pytest.fixture
-def interruptible():
+def interrupted_here():
     """SIGINT is an interrupt, also where who started the tests in the background had it ignored."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
 
 
-@pytest.mark.usefixtures("interruptible")
+@pytest.mark.usefixtures("interrupted_here")
 def test_a_command_that_is_broken_off_is_exit_status_130(monkeypatch):
     stops = typer.Typer()
 
@@ -183,7 +184,7 @@ def test_ctrl_c_is_exit_status_130(tmp_path):
     done = subprocess.Popen(
         [sys.executable, "-m", "flownav", "rig", "--runs", "200", "--out", "rig"],
         cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background ignores it
+        preexec_fn=interruptible,
     )  # fmt: skip
     try:
         until_s = time.monotonic() + 120.0

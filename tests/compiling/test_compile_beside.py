@@ -16,7 +16,7 @@ import pytest
 
 from flownav.core.compiling import beside, closure
 from flownav.core.compiling.units import unit
-from forking import Nursery, nursery
+from forking import Nursery, interruptible, nursery
 
 HUNG_S = 120.0  # whatever takes so long hangs
 PARTS = """
@@ -88,11 +88,6 @@ def started(place: Path, *command: str, **environment: str) -> subprocess.Popen[
     env = environment_of(place, environment)
     pipes: Any = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     return subprocess.Popen([sys.executable, "-B", *command], env=env, text=True, preexec_fn=interruptible, **pipes)
-
-
-def interruptible() -> None:
-    """Ctrl-C reaches it, though who runs the tests may ignore it (nohup, a shell's background)."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def ran(mother: Nursery, place: Path, **environment: str) -> tuple[str, list[str]]:

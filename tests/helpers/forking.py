@@ -74,9 +74,14 @@ def serve() -> dict[str, Any] | None:
     return None
 
 
+def interruptible() -> None:
+    """Ctrl-C reaches this process, though who runs the tests may ignore it (nohup, a shell's background)."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def become(asked: dict[str, Any]) -> None:
     """Run the program as if it were all that this process ever did."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    interruptible()
     for number, file in enumerate((os.devnull, asked["out"], asked["err"])):
         opened = os.open(file, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o600)
         os.dup2(opened, number)

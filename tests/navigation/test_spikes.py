@@ -41,7 +41,13 @@ def test_a_longer_step_and_a_shaken_vehicle_may_jump_further():
     jump = reading((3.0, 0.0, 0.0))
     assert not judge_spike(jump, 0.02, KEPT, CALM)[0]
     assert not judge_spike(jump, STEP_S, KEPT, CALM._replace(gyro_rad_s=0.5))[0]
-    assert not judge_spike(jump, 0.2, KEPT, CALM)[0]  # after a gap anything may be
+    assert not judge_spike(jump, 0.2, KEPT, CALM)[0]  # after a gap as much as at 50 Hz
+    assert judge_spike(reading((6.0, 0.0, 0.0)), 0.2, KEPT, CALM)[0]
+
+
+def test_after_a_gap_what_stays_is_believed_at_the_fourth_reading():
+    verdicts, _ = judged([reading(accel=(0.0, 150.0, -9.8))] * 4, 0.4)
+    assert verdicts == [True, True, True, False]
 
 
 def judged(readings, period_s=STEP_S, memory=CALM):
@@ -58,8 +64,7 @@ def test_a_burst_is_refused_for_three_tenths_of_a_second_and_what_lasts_is_belie
     count = round(0.4 / period_s)
     for said in (reading((5.0, 0.0, 0.0)), reading(accel=(40.0, 0.0, -9.8))):
         verdicts, _ = judged([said] * count, period_s)
-        assert sum(verdicts) == pytest.approx(BURST_S / period_s, abs=1)
-        assert all(verdicts[: sum(verdicts)])
+        assert verdicts.index(False) == pytest.approx(BURST_S / period_s, abs=1)
 
 
 def test_a_burst_of_noise_does_not_make_itself_usual_and_motors_that_start_do():
@@ -149,11 +154,13 @@ def test_one_spike_of_10_ms_in_a_hover_moves_nothing():
 
 @pytest.mark.parametrize("told", [{}, {"notch_rotor_hz": 24.0, "notch_blades_hz": 48.0}])
 @pytest.mark.parametrize("axis", [0, 4])
-def test_a_reading_that_no_unit_can_make_is_none_even_after_a_gap_where_no_jump_is_a_spike(axis, told):
+@pytest.mark.parametrize("value_read", [1e200, 1000.0])
+def test_one_mad_reading_after_a_gap_is_none(value_read, axis, told):
+    """1000 m/s2, held for what of the gap the filter still follows, had been 250 m/s."""
     flown = fly(still, 20.0).cut(Sensor.IMU, 8.0, 8.15)
     imu = flown.streams[Sensor.IMU]
     value = imu.value.copy()
-    value[np.searchsorted(imu.t_s, 8.15), axis] = 1e200
+    value[np.searchsorted(imu.t_s, 8.15), axis] = value_read
     struck, calm = navigate(flown.changed(Sensor.IMU, value=value), **told), navigate(flown, **told)
     late = struck.t_s > 10.0
     assert np.sqrt(np.mean(struck.velocity_error[late] ** 2)) < 0.01 + np.sqrt(np.mean(calm.velocity_error[late] ** 2))

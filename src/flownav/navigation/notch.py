@@ -63,6 +63,12 @@ def is_notched(s: ImuSettings) -> bool:
 
 
 @equation
+def read_angle(tone_hz: float, dt_s: float) -> float:
+    """How far a tone seems to turn between readings so far apart [rad], up to half a turn: it is read at its alias."""
+    return abs(within_half_turn(2.0 * math.pi * tone_hz * dt_s))
+
+
+@equation
 def turn_of(tone_hz: float, dt_s: float) -> Turn:
     """A tone of 0 Hz is none: it takes nothing.
 
@@ -70,9 +76,9 @@ def turn_of(tone_hz: float, dt_s: float) -> Turn:
     2 Hz: it is the vehicle's own motion, and at 0 Hz gravity. Its phasor turns on over a lost reading, and fades.
     """
     angle = 2.0 * math.pi * tone_hz * dt_s
-    read_angle = abs(within_half_turn(angle))
-    drawn = read_angle >= 2.0 * math.pi * LEAST_NOTCH_HZ * dt_s
-    share = 1.0 - exp(-read_angle / WIDTH)
+    seen_angle = read_angle(tone_hz, dt_s)
+    drawn = seen_angle >= 2.0 * math.pi * LEAST_NOTCH_HZ * dt_s
+    share = 1.0 - exp(-seen_angle / WIDTH)
     return Turn(cos(angle), sin(angle), share if drawn else 0.0, 1.0 if drawn else SPEED_S / (SPEED_S + dt_s))
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from flownav.core.frames import GRAVITY_M_S2
 from flownav.core.parameter_files import check
-from flownav.navigation.notch import LEAST_NOTCH_HZ, WIDTH
+from flownav.navigation.notch import LEAST_NOTCH_HZ, WIDTH, read_angle
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
 from flownav.sensors.barometer import BarometerSheet
@@ -207,7 +207,7 @@ def _shaken(sheet: InertialSheet, part: str, rotor_hz: tuple[float, float] | Non
 
 def _read_hz(tone_hz: float, rate_hz: float) -> float:
     """The frequency at which a tone is read at this rate."""
-    return abs(tone_hz - rate_hz * round(tone_hz / rate_hz))
+    return read_angle(tone_hz, 1.0 / rate_hz) * rate_hz / (2.0 * math.pi)
 
 
 def _harm(tone_hz: float, rate_hz: float, off: float | None) -> float:

@@ -30,8 +30,9 @@ ACCEL_JUMP_M_S2, SHAKING_M_S3 = 10.0, 1000.0  # at 20, bursts of 30 (test_live_g
 SPIKE_RATIO = 6.0  # times the usual jump: chosen; at 3 what a vehicle can do is a spike (test_spikes)
 USUAL_JUMP_READINGS = 50.0  # over which that is followed: chosen; half and twice as many pass test_spikes too
 BURST_SLOWNESS = 3.0  # times, in a burst: it must not make itself usual; chosen, 1.5 and 6 pass test_spikes too
-LONGEST_S = 0.1  # after a gap no jump is a spike: chosen, not measured
-MOST_REFUSED = 3.0  # in a row, of one that shakes, where what the next reading says again is believed (test_spikes)
+LONGEST_S = 0.1  # chosen, not measured: readings further apart are no neighbours
+AFTER_GAP_S = 0.02  # chosen: a jump over a gap is held to what 50 Hz allow; the first reading stands for 0.25 s of it
+MOST_REFUSED = 3.0  # in a row, after a gap, or of one that shakes and says nothing again (test_spikes)
 # usual jumps of one that does not shake, where a burst is told from what happens: 0.05 to 0.08 and 0.5 to 0.6 in the
 # outdoor logs; mocap and indoor-made shake (0.07 to 0.1 and 1.5 to 1.9), d-vibration most (0.3 and 7.6)
 CALM_RAD_S, CALM_M_S2 = 0.3, 1.5
@@ -61,31 +62,31 @@ def judge_spike(reading: Reading, step_s: float, m: ImuMemory, s: SpikeMemory) -
 
     Only in a vehicle that does not shake is a burst told from what happens to it; in one that does, what the next
     reading says again is believed, and three in a row are the most. In a burst a reading is held against what was kept
-    before it, by the jump that was possible when it began. The usual jump is that between neighbours, kept or not:
-    motors that start shake every reading, a burst stands still.
+    before it, by the jump that was possible when it began. After a gap three in a row are the most. The usual jump is
+    that between neighbours, kept or not: motors that start shake every reading, a burst stands still.
     """
     gyro = distance(reading.value_0 - m.gyro_x, reading.value_1 - m.gyro_y, reading.value_2 - m.gyro_z)
     accel = distance(reading.value_3 - m.accel_x, reading.value_4 - m.accel_y, reading.value_5 - m.accel_z)
     calm = (s.gyro_rad_s < CALM_RAD_S and s.accel_m_s2 < CALM_M_S2) or s.refused > MOST_REFUSED
     burst = calm and s.refused > 0.0 and step_s <= BURST_S
-    reach_s = s.reach_s if burst else step_s
+    near = burst or step_s <= LONGEST_S
+    reach_s = s.reach_s if burst else step_s if near else AFTER_GAP_S
     most_gyro = GYRO_JUMP_RAD_S + TURNING_RAD_S2 * reach_s + SPIKE_RATIO * s.gyro_rad_s
     most_accel = ACCEL_JUMP_M_S2 + SHAKING_M_S3 * reach_s + SPIKE_RATIO * s.accel_m_s2
     back = RETURN_SHARE if burst else 1.0
     jumps = gyro > back * most_gyro or accel > back * most_accel
-    comparable = burst or step_s <= LONGEST_S
     gyro_next = distance(reading.value_0 - s.gyro_x, reading.value_1 - s.gyro_y, reading.value_2 - s.gyro_z)
     accel_next = distance(reading.value_3 - s.accel_x, reading.value_4 - s.accel_y, reading.value_5 - s.accel_z)
     again = s.refused > 0.0 and gyro_next < 0.5 * most_gyro and accel_next < 0.5 * most_accel
     confirmed = not calm and (again or s.refused >= MOST_REFUSED)
-    spike = (jumps and comparable and not confirmed) or is_dead(reading)
+    spike = (jumps and (near or s.refused < MOST_REFUSED) and not confirmed) or is_dead(reading)
     share = 1.0 / (BURST_SLOWNESS * USUAL_JUMP_READINGS if spike else USUAL_JUMP_READINGS)
     gyro_usual = s.gyro_rad_s + share * (smaller(gyro_next, most_gyro) - s.gyro_rad_s)
     accel_usual = s.accel_m_s2 + share * (smaller(accel_next, most_accel) - s.accel_m_s2)
     return spike, SpikeMemory(
         s.refused + 1.0 if spike else 0.0,
-        gyro_usual if comparable else s.gyro_rad_s,
-        accel_usual if comparable else s.accel_m_s2,
+        gyro_usual if near else s.gyro_rad_s,
+        accel_usual if near else s.accel_m_s2,
         reading.value_0, reading.value_1, reading.value_2, reading.value_3, reading.value_4, reading.value_5,
         reach_s,
     )  # fmt: skip

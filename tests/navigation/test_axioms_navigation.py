@@ -30,10 +30,10 @@ from flownav.navigation.flow_noise import (
     lasting_walk,
     wrong_since,
 )
-from flownav.navigation.gps import judge_rejections
+from flownav.navigation.gps import judge_rejections, squared_acceleration
 from flownav.navigation.heading import heading_variance
 from flownav.navigation.height import judge_ground, repeats
-from flownav.navigation.inertial import paid, steady_force
+from flownav.navigation.inertial import SWING_S, paid, steady_force, turning_noise
 from flownav.navigation.loop import start_navigator
 from flownav.navigation.memory import CLOCK, MEMORY, SCALE_DOUBT, new_work
 from flownav.navigation.motion_records import (
@@ -391,6 +391,20 @@ def test_what_is_followed_lies_between_what_it_was_and_what_is_seen(step_s):
         for name, value in found.items():
             assert min(2.0, seen) <= value <= max(2.0, seen), name
             assert bool(value == 2.0) is (step_s == 0.0), name
+
+
+@SEEDS
+def test_north_may_be_anywhere_for_what_acceleration_does_to_a_receiver_and_either_turn_for_the_gyro(seed):
+    rng = np.random.default_rng(seed)
+    north, east, down, angle, turn = rng.normal(size=5)
+    c, s = math.cos(angle), math.sin(angle)
+    felt = squared_acceleration(SteadyForce(north, east, down))
+    assert squared_acceleration(SteadyForce(c * north - s * east, s * north + c * east, down)) == pytest.approx(felt)
+    assert squared_acceleration(SteadyForce(0.0, 0.0, -GRAVITY_M_S2)) == 0.0  # standing still
+    assert squared_acceleration(SteadyForce(3.0, 4.0, -GRAVITY_M_S2 - 12.0)) == pytest.approx(13.0**2)
+    told = NavigatorSettingsFile(gyro_noise_rad_s_rt_hz=0.01, gyro_scale_sigma=0.02)
+    assert turning_noise(-turn, told) == turning_noise(turn, told)
+    assert turning_noise(2.0 * turn, told) - 1e-4 == pytest.approx(SWING_S * (0.04 * turn) ** 2)
 
 
 @SEEDS

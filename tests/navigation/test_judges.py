@@ -8,17 +8,18 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from flownav.core.frames import GRAVITY_M_S2
 from flownav.estimation.named import PositionNed
 from flownav.estimation.states import BARO
 from flownav.navigation.attitude import read_attitude
 from flownav.navigation.baro import judge_baro
 from flownav.navigation.flow_judge import judge_look, turning_of
 from flownav.navigation.flow_noise import alike, flow_variance, followed_agreement, lasting_doubt, wrong_since
-from flownav.navigation.gps import judge_fix, judge_rejections
+from flownav.navigation.gps import LAG_LEFT, judge_fix, judge_rejections
 from flownav.navigation.heading import heading_variance, magnetic_heading
 from flownav.navigation.height import range_variance, range_verdict, repeats
 from flownav.navigation.inertial import motion_between, said_by, sound
-from flownav.navigation.motion_records import ImuMemory
+from flownav.navigation.motion_records import ImuMemory, SteadyForce
 from flownav.navigation.place import judge_pad
 from flownav.navigation.reasons import (
     BEFORE_START,
@@ -92,9 +93,12 @@ def test_what_is_said_of_any_reading_stands_in_this_order():
 
 
 # -- GPS -----------------------------------------------------------------------------------------------------
-def judged_fix(fix: Reading, axis: int, *, level_ratio: float = 0.0, position: bool = True, alone: bool = False):
+CALM = SteadyForce(0.0, 0.0, -GRAVITY_M_S2)
+
+
+def judged_fix(fix: Reading, axis: int, *, level_ratio: float = 0.0, position=True, alone=False, steady=CALM):
     memory = GpsMemory(level_ratio=level_ratio)
-    return judge_fix.law(fix, StartMemory(1.0), memory, axis=axis, position=position, alone=alone, s=TOLD.gps)
+    return judge_fix.law(fix, StartMemory(1.0), memory, steady, axis=axis, position=position, alone=alone, s=TOLD.gps)
 
 
 def test_the_noise_of_a_fix_is_its_white_part_and_a_share_of_what_it_states():
@@ -107,6 +111,10 @@ def test_the_noise_of_a_fix_is_its_white_part_and_a_share_of_what_it_states():
     unsaid = reading(1.0, 2.0, 3.0)
     for axis, sigma in ((2, s.gps_velocity_white_down_m_s), (0, s.gps_velocity_white_m_s)):
         assert judged_fix(unsaid, axis, position=False) == (axis + 1.0, pytest.approx(sigma**2), FUSED)
+        pushed = {"steady": SteadyForce(3.0, 0.0, -GRAVITY_M_S2 - 4.0)}
+        lagging = (LAG_LEFT * s.gps_velocity_lag_sigma_s * 5.0) ** 2
+        assert judged_fix(unsaid, axis, position=False, **pushed).variance == pytest.approx(sigma**2 + lagging)
+        assert judged_fix(unsaid, axis, **pushed) == judged_fix(unsaid, axis)  # a place does not lag so
 
 
 def test_a_fix_that_jumps_along_one_axis_is_refused_along_both_and_keeps_its_height():

@@ -98,6 +98,14 @@ def test_weight_turns_scale_and_misalignment_of_an_accelerometer_into_bias():
     assert of_inertial(sheet)["accel_bias_sigma_m_s2"] == pytest.approx(whole)
 
 
+def test_the_gyros_scale_is_told_with_its_alignment():
+    sheet = shipped_sheets().inertial
+    gyro = sheet.gyro.model_copy(update={"scale_percent": 3.0, "misalignment_deg": math.degrees(0.04)})
+    changed = sheet.model_copy(update={"gyro": gyro})
+    assert of_inertial(changed)["gyro_scale_sigma"] == pytest.approx(0.05)
+    assert settings_of()[0].gyro_scale_sigma == 0.0
+
+
 def test_vibration_of_the_sheet_counts_as_noise_and_as_harmless():
     sheet = InertialSheet.read()
     calm = of_inertial(sheet.model_copy(update={"vibration": Vibration()}))

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.compile import Lanes, Work, equation, larger, procedure, replacing, row_of, smaller
+from flownav.core.frames import GRAVITY_M_S2
 from flownav.core.measurement import Sensor
 from flownav.estimation.covariance import covariance_of, expect, states_of, variance_of
 from flownav.estimation.laws.gps import gps_position, gps_velocity
@@ -22,6 +23,7 @@ from flownav.navigation.told import GpsSettings
 from flownav.navigation.trust import OF_GPS, follow_noise, scale_noise
 from flownav.navigation.verdicts import Event, Force, Offer, Reset, Tested, on_lanes
 
+LAG_LEFT = 0.3  # chosen: half of it is as good, with none v is too sure in a tail wind (test_wind_from_all_sides)
 LEAST_REJECTIONS = 5  # chosen: a second of a 5 Hz receiver; one refusal alone is none (test_judges)
 SOON_S = 1.0  # with 7 s a flow of the wrong sign carried the vehicle 84 m off, so 10 to 15 (flownav faults)
 UNKNOWN_PAD_M = 100.0  # as good as unknown: the tie to the vehicle that follows tells it
@@ -61,9 +63,13 @@ MEMORY.derive(AlongAxis, along_axis, "axis")
 # -- one axis of a fix ----------------------------------------------------------------------------------------
 @on_lanes
 def judge_fix(
-    reading: Reading, start: StartMemory, m: GpsMemory, *, axis: int, position: bool, alone: bool, s: GpsSettings
-) -> Offer:
+    reading: Reading, start: StartMemory, m: GpsMemory, steady: SteadyForce,
+    *, axis: int, position: bool, alone: bool, s: GpsSettings,
+) -> Offer:  # fmt: skip
     """One axis of a fix: the variance is the white part of its noise, and a share of the accuracy that it states.
+
+    A velocity errs the more, the more the vehicle is accelerated: no receiver's smoothing is just the lag that is
+    estimated (`gps_velocity`), and of a swinging antenna's own velocity that knows nothing.
 
     North and east come of one fix, and a jump along one axis spoils both; alone: whatever the other axis says.
     """
@@ -72,10 +78,18 @@ def judge_fix(
     white_velocity = s.gps_velocity_white_down_m_s if axis == 2 else s.gps_velocity_white_m_s
     white = white_position if position else white_velocity
     share = s.gps_white_share * s.gps_white_share * (stated if np.isfinite(stated) else 0.0)
-    variance = white * white + share
+    lag_s = 0.0 if position or start.started == 0.0 else LAG_LEFT * s.gps_velocity_lag_sigma_s
+    variance = white * white + share + lag_s * lag_s * squared_acceleration(steady)
     reason = usable(reading, value, variance, start.started)
     spoilt = reason == FUSED and axis < 2 and m.level_ratio > 1.0 and not alone
     return Offer(value, variance, INNOVATION_GATE if spoilt else reason)
+
+
+@equation
+def squared_acceleration(steady: SteadyForce) -> float:
+    """Square of the vehicle's acceleration [m2/s4], of the steady specific force, NED."""
+    down_m_s2 = steady.down_m_s2 + GRAVITY_M_S2
+    return steady.north_m_s2 * steady.north_m_s2 + steady.east_m_s2 * steady.east_m_s2 + down_m_s2 * down_m_s2
 
 
 @equation

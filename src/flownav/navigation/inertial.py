@@ -23,6 +23,7 @@ from flownav.navigation.verdicts import AppliedMotion, Event, Force, MotionNoise
 from flownav.navigation.vibration import followed_vibration, with_reading
 
 LEAST_STEP_S = 0.002  # chosen: half a period at 250 Hz; what is owed over less would be an acceleration of its own
+SWING_S = 0.3  # chosen: 0.6 is as good, with none all three velocities are too sure (test_wind_from_all_sides)
 STEADY_S = 0.1  # chosen: of vibration at 24 Hz (the shipped rotor) a fifteenth is left
 BEYOND_ANY_UNIT = 1e4  # m/s2 and rad/s: chosen, five times what the widest shock sensor of an autopilot reads (200 g)
 with_motion = replacing(ImuMemory, "vibration", "gap")
@@ -70,6 +71,17 @@ def without_tones(motion: Motion, m: ToneMemory) -> Motion:
 def told_noise(least: float, power: float, s: ImuSettings) -> float:
     """Density of the accelerometer's noise [m/s2/sqrt(Hz)]: as told, or as what is left beside the tones shows."""
     return larger(least, np.sqrt(power)) if is_notched(s) else least
+
+
+@equation
+def turning_noise(turn_rad_s: float, s: ImuSettings) -> float:
+    """Density squared of the gyro's noise [rad2/s]: what is told, and what turning about body down makes of its scale.
+
+    An error of scale or alignment is a lasting share of what is turned, and the tilt that it makes of a turn comes back
+    as the heading does: white noise of the time that a swing lasts.
+    """
+    scale = s.gyro_scale_sigma * turn_rad_s
+    return s.gyro_noise_rad_s_rt_hz * s.gyro_noise_rad_s_rt_hz + SWING_S * scale * scale
 
 
 @equation
@@ -159,7 +171,7 @@ def judge_motion(
     told_down = told_noise(least_down, tones.noise_power, s)
     accel = doubt.level * told if moving else s.coasting_accel_m_s2_rt_hz
     accel_down = larger(doubt.level, doubt.down) * told_down if moving else s.coasting_accel_m_s2_rt_hz
-    gyro = s.gyro_noise_rad_s_rt_hz if moving else s.coasting_rate_rad_s_rt_hz
+    gyro = turning_noise(r.value, s) if moving else s.coasting_rate_rad_s_rt_hz * s.coasting_rate_rad_s_rt_hz
     return StepMotion(
         MotionStep(1.0 if moving else 0.0),
         AppliedMotion(p.value, q.value, r.value, x.value, y.value, z.value),
@@ -173,7 +185,7 @@ def judge_motion(
             OwedMotion(p.owed, q.owed, r.owed, x.owed, y.owed, z.owed),
             tones,
         ),
-        MotionNoise(accel * accel, accel_down * accel_down, gyro * gyro),
+        MotionNoise(accel * accel, accel_down * accel_down, gyro),
         Event(IMU_LOST if loses else -1, period_s),
     )
 

@@ -54,6 +54,9 @@ class NavigatorSettingsFile(ParameterModel):
     gyro_noise_rad_s_rt_hz: Number = Field(
         0.004, gt=0, le=5, description="gyro noise with vibration and sampling; PX4's 0.015 rad/s at 8 ms is 0.0013"
     )
+    gyro_scale_sigma: Number = Field(
+        0.0, ge=0, le=0.2, description="gyro's errors of scale and alignment; 0: the noise holds them"
+    )
     accel_walk_m_s2_rt_s: Number = Field(0.003, ge=0, le=1, description="accelerometer bias, PX4's 0.003")
     gyro_walk_rad_s_rt_s: Number = Field(1e-4, ge=0, le=0.1, description="gyro bias over minutes of warming")
     imu_integrates: Number = Field(

@@ -162,6 +162,7 @@ def of_inertial(sheet: InertialSheet, rotor_hz: tuple[float, float] | None = Non
         "accel_noise_m_s2_rt_hz": level,
         "accel_noise_down_share": down / level,
         "gyro_noise_rad_s_rt_hz": math.hypot(gyro_white, turning_rad_s * rt_period_s),
+        "gyro_scale_sigma": math.hypot(0.01 * gyro.scale_percent, math.radians(gyro.misalignment_deg)),
         "accel_walk_m_s2_rt_s": mg * accel.walk_mg_rts,
         "gyro_walk_rad_s_rt_s": math.radians(gyro.walk_deg_s_rts),
         "accel_bias_sigma_m_s2": max(accel_bias, 1e-4),

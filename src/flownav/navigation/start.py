@@ -206,7 +206,7 @@ def begin(work: Work, lanes: Lanes, lane: int, first: FirstState, p: Work) -> No
     store_biases(work, lanes, lane, Biases(0.0, 0.0, 0.0, level.bias_x, level.bias_y, 0.0))
     store_rate(work, lanes, lane, Rate(0.0, 0.0, 0.0))
     store_force(work, lanes, lane, Force(0.0, 0.0, 0.0))
-    store_steady(work, lanes, lane, SteadyForce(0.0, 0.0, 0.0))
+    store_steady(work, lanes, lane, SteadyForce(0.0, 0.0, -GRAVITY_M_S2))
     for i in range(3):
         set_variance(work, lanes, POSITION + i, lane, first.position_variance)
         set_variance(work, lanes, ATTITUDE + i, lane, first.heading_variance if i == 2 else level.tilt_variance)

@@ -24,6 +24,7 @@ class GpsSettings(NamedTuple):
     gps_slow_sigma_down_m: float
     gps_fast_sigma_m: float
     gps_fast_sigma_down_m: float
+    gps_velocity_lag_sigma_s: float
     gps_velocity_sigma_m_s: float
     gps_velocity_sigma_down_m_s: float
     gps_forward_m: float
@@ -146,6 +147,7 @@ class ImuSettings(NamedTuple):
     accel_noise_m_s2_rt_hz: float
     accel_noise_down_share: float
     gyro_noise_rad_s_rt_hz: float
+    gyro_scale_sigma: float
     accel_walk_m_s2_rt_s: float
     coasting_accel_m_s2_rt_hz: float
     coasting_rate_rad_s_rt_hz: float

@@ -24,7 +24,8 @@ BASE = "pad_return"  # its vehicle, sensors, wind and pad
 TAKEOFF_S, CLIMB_M_S, SETTLING_S, AFTER_S = 5.0, 1.0, 10.0, 5.0
 SINK_M_S, RESTING_S = 0.3, 5.0
 NO_FAULT = "none"
-PLACED_S, PLACED_SIGMA_M = 1.0, 0.02  # when and how well a vehicle on the pad is told where it stands
+# When a vehicle on the pad is told where it stands, and how well: its navigator has levelled by then and has started.
+PLACED_S, PLACED_SIGMA_M = 3.0, 0.02
 
 
 class Row(NamedTuple):

@@ -68,8 +68,8 @@ def judge_fix(
 ) -> Offer:  # fmt: skip
     """One axis of a fix: the variance is the white part of its noise, and a share of the accuracy that it states.
 
-    A velocity errs the more, the more the vehicle is accelerated: no receiver's smoothing is just the lag that is
-    estimated (`gps_velocity`), and of a swinging antenna's own velocity that knows nothing.
+    A velocity errs the more, the more the vehicle is accelerated: the lag that is estimated (`gps_velocity`) is one
+    number for a smoothing that is none, and leaves over a share LAG_LEFT of its doubt times the acceleration.
 
     North and east come of one fix, and a jump along one axis spoils both; alone: whatever the other axis says.
     """

@@ -51,7 +51,7 @@ class BridgeMemory(NamedTuple):
 
 class SpikeMemory(NamedTuple):
     """How many inertial readings in a row were refused as spikes; the usual jump from one to the next, of gyro [rad/s]
-    and accelerometer [m/s2]; the newest reading, spike or not; and the step in which the last jump was judged [s].
+    and accelerometer [m/s2]; the newest reading, spike or not; and the time over which the last jump was possible [s].
     """
 
     refused: float = 0.0

@@ -55,7 +55,7 @@ class NavigatorSettingsFile(ParameterModel):
         0.004, gt=0, le=5, description="gyro noise with vibration and sampling; PX4's 0.015 rad/s at 8 ms is 0.0013"
     )
     gyro_scale_sigma: Number = Field(
-        0.0, ge=0, le=0.2, description="gyro's errors of scale and alignment; 0: the noise holds them"
+        0.0, ge=0, le=0.2, description="gyro's scale and alignment, one standard deviation, a share; 0: in the noise"
     )
     accel_walk_m_s2_rt_s: Number = Field(0.003, ge=0, le=1, description="accelerometer bias, PX4's 0.003")
     gyro_walk_rad_s_rt_s: Number = Field(1e-4, ge=0, le=0.1, description="gyro bias over minutes of warming")
@@ -102,7 +102,7 @@ class NavigatorSettingsFile(ParameterModel):
     gps_velocity_sigma_m_s: Number = Field(0.1, ge=0, le=20, description="GPS velocity: the part that lasts")
     gps_velocity_sigma_down_m_s: Number = Field(0.1, ge=0, le=20, description="and vertically")
     gps_velocity_tau_s: Number = Field(5.0, gt=0, le=1e6, description="for some seconds")
-    gps_velocity_white_m_s: Number = Field(0.4, gt=0, le=20, description="GPS velocity: noise, and lag in manoeuvres")
+    gps_velocity_white_m_s: Number = Field(0.4, gt=0, le=20, description="GPS velocity: noise, without its lag")
     gps_velocity_white_down_m_s: Number = Field(0.5, gt=0, le=20, description="and vertically")
     gps_velocity_lag_sigma_s: Number = Field(0.15, ge=0, le=2, description="receivers smooth their velocity, and lag")
     gps_forward_m: Number = Field(0.0, ge=-10, le=10, description="the antenna from the IMU, body forward")

@@ -98,9 +98,8 @@ def _compiling_elsewhere(what: str, name: tuple[str, str]) -> Iterator[subproces
     except OSError:
         yield None
         return
-    for unneeded in _begun.values():
-        _end(unneeded)
-    _begun.clear()
+    while _begun:
+        _end(_begun.popitem()[1])
     PROGRESS.begin(what)
     try:
         yield other

@@ -18,7 +18,7 @@ from flownav.sensors.camera_sheets import FlowCameraSheet, PadCameraSheet
 from flownav.sensors.datasheet import FlowSensor, identified_flow, needs_lag_states
 from flownav.sensors.magnetometer import MagneticField, MagnetometerSheet
 from flownav.sensors.range_sensor import RangeSensorSheet
-from flownav.sensors.sheets import GpsReceiverSheet, InertialSheet, SensorSheets
+from flownav.sensors.sheets import AccelerometerSheet, GpsReceiverSheet, GyroSheet, InertialSheet, SensorSheets
 
 ABOVE_FLOOR_M = 0.01  # a step of the shipped lidar: a rangefinder that reads its floor says only that there is no more
 LEAST_SHARE = 0.05  # of a stated accuracy, where the sheet says what changes from fix to fix: chosen, not measured
@@ -153,8 +153,7 @@ def of_inertial(sheet: InertialSheet, rotor_hz: tuple[float, float] | None = Non
     mg = 1e-3 * GRAVITY_M_S2
     accel_white = 1e-3 * mg * accel.density_ug_rthz / math.sqrt(2.0)
     gyro_white = math.radians(gyro.density_deg_s_rthz) / math.sqrt(2.0)
-    by_weight = math.hypot(0.01 * accel.scale_percent, math.radians(accel.misalignment_deg))
-    accel_bias = math.hypot(mg * accel.bias_mg, by_weight * GRAVITY_M_S2)
+    accel_bias = math.hypot(mg * accel.bias_mg, _scale_error(accel) * GRAVITY_M_S2)
     gyro_bias = math.radians(math.hypot(gyro.bias_deg_s, gyro.g_sensitivity_deg_s_g))
     usual = NavigatorSettingsFile()
     level, down = (math.hypot(accel_white, shaken_m_s2 * rt_period_s) for shaken_m_s2 in (level_m_s2, down_m_s2))
@@ -162,7 +161,7 @@ def of_inertial(sheet: InertialSheet, rotor_hz: tuple[float, float] | None = Non
         "accel_noise_m_s2_rt_hz": level,
         "accel_noise_down_share": down / level,
         "gyro_noise_rad_s_rt_hz": math.hypot(gyro_white, turning_rad_s * rt_period_s),
-        "gyro_scale_sigma": math.hypot(0.01 * gyro.scale_percent, math.radians(gyro.misalignment_deg)),
+        "gyro_scale_sigma": _scale_error(gyro),
         "accel_walk_m_s2_rt_s": mg * accel.walk_mg_rts,
         "gyro_walk_rad_s_rt_s": math.radians(gyro.walk_deg_s_rts),
         "accel_bias_sigma_m_s2": max(accel_bias, 1e-4),
@@ -173,6 +172,11 @@ def of_inertial(sheet: InertialSheet, rotor_hz: tuple[float, float] | None = Non
         "imu_integrates": 1.0,
         "position_walk_m_rt_s": INTEGRATED_M_RT_S,
     } | _notches(sheet, rotor_hz)
+
+
+def _scale_error(part: GyroSheet | AccelerometerSheet) -> float:
+    """One standard deviation of scale and alignment together, a share of what is read."""
+    return math.hypot(0.01 * part.scale_percent, math.radians(part.misalignment_deg))
 
 
 def _notches(sheet: InertialSheet, rotor_hz: tuple[float, float] | None) -> Keys:

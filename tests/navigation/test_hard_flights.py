@@ -126,6 +126,39 @@ def test_one_that_reads_6_too_much_along_the_vertical_at_once_leaves_the_height_
     assert np.abs(flown.error[:, 2] - flown.error[0, 2]).max() < 5.0
 
 
+def lying_on_all_axes_at_once() -> Navigated:
+    """A hover with all aids whose accelerometer reads 3 m/s2 too much on every axis from 10 s on."""
+    return navigate(added_to(noisy(fly(still, 40.0)), Sensor.IMU, [0.0] * 3 + [3.0] * 3, 10.0))
+
+
+def test_a_range_that_creeps_out_of_its_gate_makes_the_accelerometer_doubted_on_all_axes_and_no_new_ground():
+    """3.0 m in height and 10.0 m level where it was a step of the ground, 20 m level where only down was doubted."""
+    flown = lying_on_all_axes_at_once()
+    assert len(flown.events("imu", "doubted")) == 1
+    assert len(flown.events("range", "reset")) == 0
+    assert np.abs(flown.error[:, 2] - flown.error[0, 2]).max() < 0.7
+    assert np.abs(flown.error[:, :2]).max() < 2.0
+
+
+@pytest.mark.parametrize("slope_m_s", [0.02, 0.1, 0.3, 1.0])
+def test_ground_that_slopes_below_does_not_make_the_accelerometer_doubted(slope_m_s):
+    """The range alone tells of the slope, 1.5 m of it; the ground is a state that walks."""
+    flown = noisy(fly(circle, 30.0))
+    stream = flown.streams[Sensor.RANGE]
+    slope_m = np.clip((stream.t_s - 10.0) * slope_m_s, 0.0, 1.5)
+    run_ = navigate(flown.changed(Sensor.RANGE, value=stream.value + slope_m[:, None]))
+    assert len(run_.events("imu", "doubted")) == 0
+
+
+@pytest.mark.parametrize("step_m", [-1.0, 0.5, 1.0])
+def test_a_step_of_the_ground_jumps_and_does_not_make_the_accelerometer_doubted(step_m):
+    flown = noisy(fly(circle, 30.0))
+    stream = flown.streams[Sensor.RANGE]
+    stepped = stream.value + np.where(stream.t_s > 10.0, step_m, 0.0)[:, None]
+    run_ = navigate(flown.changed(Sensor.RANGE, value=stepped))
+    assert len(run_.events("imu", "doubted")) == 0
+
+
 # -- ranges --------------------------------------------------------------------------------------------------
 def test_a_range_of_which_every_other_reading_is_a_stray_keeps_the_height():
     flown = noisy(fly(circle, 30.0).only(*OWN))

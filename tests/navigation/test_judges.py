@@ -17,7 +17,7 @@ from flownav.navigation.flow_judge import judge_look, turning_of
 from flownav.navigation.flow_noise import alike, flow_variance, followed_agreement, lasting_doubt, wrong_since
 from flownav.navigation.gps import LAG_LEFT, judge_fix, judge_rejections
 from flownav.navigation.heading import heading_variance, magnetic_heading
-from flownav.navigation.height import range_variance, range_verdict, repeats
+from flownav.navigation.height import creeps, range_variance, range_verdict, repeats
 from flownav.navigation.inertial import motion_between, said_by, sound
 from flownav.navigation.motion_records import ImuMemory, SteadyForce
 from flownav.navigation.place import judge_pad
@@ -56,6 +56,7 @@ from flownav.navigation.tape import BARO_FOUND
 from flownav.navigation.told import NO_HEADING as HEADLESS
 from flownav.navigation.told import Equipment
 from flownav.navigation.verdicts import Event, Height, Offer, Reset
+from flownav.navigation.verdicts import Tested as Outcome
 from flownav.navigation.vibration import followed_vibration, vibration_beyond, with_reading
 
 NAN = math.nan
@@ -252,6 +253,19 @@ def test_a_range_states_its_variance_or_has_a_floor_and_a_share():
 def range_memory(**parts) -> RangeMemory:
     empty = {"taken_s": -math.inf, "refused_s": NAN, "last_m": NAN, "same_s": NAN, "down_m": 0.0, "said_s": NAN}
     return RangeMemory(**{name: 0.0 for name in RangeMemory._fields} | empty | parts)
+
+
+@pytest.mark.parametrize(("before", "refused", "crept"), [
+    (2.6, 5.1, True), (-2.6, -5.1, True), (4.9, 9.9, True),
+    (2.4, 5.1, False),  # it jumped out
+    (-2.6, 5.1, False), (2.6, -5.1, False),  # to the other side
+    (4.9, 10.1, False),  # no motion is so wrong between two readings
+    (0.0, 5.1, False),  # none was fused yet
+])  # fmt: skip
+@pytest.mark.parametrize("sigma_m", [0.02, 1.0])
+def test_a_range_creeps_out_of_its_gate_or_jumps(before, refused, crept, sigma_m):
+    tested = Outcome(INNOVATION_GATE, refused * sigma_m, sigma_m**2, 0.5 * sigma_m**2)
+    assert creeps(tested, range_memory(sigmas=before), 5.0) == crept
 
 
 @pytest.mark.parametrize(("range_m", "upright", "reason"), [

@@ -55,6 +55,9 @@ from flownav.navigation.vibration import doubted_imu
 # Refused so long, a range that alone tells the height is believed, not the accelerometer: chosen; at once, a lone echo
 # would make the accelerometer doubted.
 DOUBTING_S = 0.05
+# Of the gate: the last range that was fused lay beyond the first, the first that is refused within the second. White
+# innovations lie beyond half a gate of 5 standard deviations once in 80. With 0.25 to 0.5 and 1.2 to 4 the tests hold.
+CREPT, JUMPED = 0.5, 2.0
 AGREEMENT_M, AGREEMENT_SHARE = 0.2, 0.05  # ranges of one ground agree so far: chosen, not measured
 LEAST_AGREEING = 3.0  # one echo finds no ground; a roof of 1.2 m is found after 1.45 s (test_navigation_safeguards)
 STILL_S = 1.0  # a range that repeats itself so long while a ground is sought is of a vehicle that stands: not measured
@@ -70,6 +73,7 @@ UNAIDED_TRAVEL_RATIO = 5.0  # times the travel, where nothing else tells the hei
 with_value = replacing(RangeMemory, "last_m", "same_s", "down_m")
 with_report = replacing(RangeMemory, "said_s")
 with_taken = replacing(RangeMemory, "taken_s", "refused_s")
+with_sigmas = replacing(RangeMemory, "sigmas")
 with_refusal = replacing(RangeMemory, "refused_s", "doubted")
 without_candidate = replacing(GroundMemory, "candidate_m", "since_s", "first_m", "agreeing", "varied")
 
@@ -230,11 +234,18 @@ class Refusal(NamedTuple):
     fate: Fate
     memory: RangingMemory
     imu: ImuMemory
-    doubts: tuple[Doubt, Doubt, Doubt]
+    doubts: tuple[Doubt, Doubt, Doubt, Doubt, Doubt]
     doubted: Event
     reset: Reset
     found: Event
     again: bool
+
+
+@equation
+def creeps(tested: Tested, m: RangeMemory, gate_sigma: float) -> bool:
+    """Whether a range has left its gate step by step: the motion errs then, where a step of the ground jumps out."""
+    sigmas = tested.innovation / np.sqrt(tested.total)
+    return m.sigmas * sigmas > 0.0 and abs(m.sigmas) > CREPT * gate_sigma and abs(sigmas) < JUMPED * gate_sigma
 
 
 @on_lanes
@@ -244,6 +255,7 @@ def judge_refusal(
 ) -> Refusal:  # fmt: skip
     """After the test: a range that is refused first makes the accelerometer doubted, then the ground new.
 
+    The accelerometer is doubted at once where the range crept out of its gate, soon where it alone tells the height.
     A streak of refusals ends where the sensor says something else. The ground is found anew where ranges agree on it
     for long, and where they do not, its candidate is followed; a vehicle that stands stands on the ground it has.
     """
@@ -254,7 +266,9 @@ def judge_refusal(
     doubted_before = m.doubted if np.isfinite(m.refused_s) else 0.0
     lasting_s = t_s - since_s
     alone = t_s - aid.height_s > s.height_hold_s
-    doubts = refused and alone and doubted_before == 0.0 and not strays and lasting_s >= DOUBTING_S
+    crept = refused and not np.isfinite(m.refused_s) and creeps(tested, m, s.gate_sigma)
+    long = alone and doubted_before == 0.0 and lasting_s >= DOUBTING_S
+    doubts = refused and not strays and (long or crept)
     by_m = tested.innovation if doubts else 0.0
     imu_after, doubt_event, freed = doubted_imu(by_m, doubts, imu)  # once: at each, a short echo would be believed too
     sought = sought_ground(reading, t_s, height, False, g, GROUND_RESET, s)
@@ -266,7 +280,8 @@ def judge_refusal(
     below_m = height.pos_d_m + (reading.value_0 + s.range_below_m) * height.upright
     followed = judge_ground(below_m, reading.value_0, t_s, False, g)[1]
     after = with_taken(m, taken_s=t_s if fused else m.taken_s, refused_s=np.nan) if ends else m
-    after = with_refusal(m, refused_s=since_s, doubted=1.0 if doubts else doubted_before) if refused else after
+    after = with_sigmas(after, sigmas=tested.innovation / np.sqrt(tested.total) if fused else after.sigmas)
+    after = with_refusal(after, refused_s=since_s, doubted=1.0 if doubts else doubted_before) if refused else after
     return Refusal(
         Fate(FUSED if again else SILENT),
         RangingMemory(

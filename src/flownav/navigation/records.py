@@ -63,7 +63,8 @@ class AidMemory(NamedTuple):
 class RangeMemory(NamedTuple):
     """taken_s: of the last range that was fused; refused_s: since when they are refused; last_m and same_s: the last
     value and since when it repeats; down_m: where the vehicle was then; said_s: of the repetition that was reported;
-    doubted: 1 once the accelerometer was doubted for it.
+    doubted: 1 once the accelerometer was doubted for it; sigmas: innovation of the last that was fused, in standard
+    deviations.
     """
 
     taken_s: float = -inf
@@ -73,6 +74,7 @@ class RangeMemory(NamedTuple):
     down_m: float = 0.0
     said_s: float = nan
     doubted: float = 0.0
+    sigmas: float = 0.0
 
 
 class EchoMemory(NamedTuple):

@@ -1,8 +1,8 @@
 """An accelerometer that lies: vibration is rectified, and a hover may read half of gravity less than there is.
 
 Two signs of it: readings that differ much from one to the next, and, where a filtered reading hides that, a range that
-contradicts the motion while nothing else tells the height. Either lets the accelerometer's bias walk and widens its
-limit, so that range, barometer or GPS keep the velocity.
+contradicts the motion: it creeps out of its gate, or nothing else tells the height. Either lets the accelerometer's
+biases walk and widens their limit, on every axis, so that range, flow, barometer or GPS keep the velocity.
 """
 
 from typing import NamedTuple
@@ -56,8 +56,8 @@ def vibration_beyond(m: ImuMemory, s: ImuSettings) -> float:
 @equation
 def doubted_imu(
     contradiction_m: float, doubted: bool, m: ImuMemory
-) -> tuple[ImuMemory, Event, tuple[Doubt, Doubt, Doubt]]:
-    """The range contradicts the motion that the accelerometer made: height, velocity and bias are set free.
+) -> tuple[ImuMemory, Event, tuple[Doubt, Doubt, Doubt, Doubt, Doubt]]:
+    """The range contradicts the motion that the accelerometer made: height, its velocity and all biases are set free.
 
     The memory, what is said of it, and the doubts; where not doubted, all as before.
     """
@@ -65,6 +65,8 @@ def doubted_imu(
     freed = (
         Doubt(POSITION + 2, contradiction_m * contradiction_m if doubted else 0.0),
         Doubt(VELOCITY + 2, DOUBTED_SPEED_M_S * DOUBTED_SPEED_M_S if doubted else 0.0),
+        Doubt(ACCEL_BIAS, DOUBT_M_S2 * DOUBT_M_S2 if doubted else 0.0),
+        Doubt(ACCEL_BIAS + 1, DOUBT_M_S2 * DOUBT_M_S2 if doubted else 0.0),
         Doubt(ACCEL_BIAS + 2, DOUBT_M_S2 * DOUBT_M_S2 if doubted else 0.0),
     )
     after = with_doubt(m, doubt_m_s2=DOUBT_M_S2 if doubted else m.doubt_m_s2)
@@ -80,15 +82,14 @@ class Shaken(NamedTuple):
 
 @on_lanes
 def add_vibration_noise(m: ImuMemory, step: MotionStep, factor: AccelFactors, *, dt_s: float, s: ImuSettings) -> Shaken:
-    """Velocity and accelerometer bias are less sure by what vibration may have made of them; a doubt is vertical.
+    """Velocity and accelerometer bias are less sure by what vibration, or what is doubted, may have made of them.
 
     Only in lanes that the IMU moves.
     """
     moved_s = dt_s if step.moves > 0.0 else 0.0
     doubt = (1.0 - smaller(moved_s / DOUBT_LASTS_S, 1.0)) * m.doubt_m_s2
     beyond = vibration_beyond(m, s)
-    level = s.vibration_walk_per_rt_s * beyond
-    down = s.vibration_walk_per_rt_s * larger(beyond, doubt)
+    level = down = s.vibration_walk_per_rt_s * larger(beyond, doubt)
     shaken = m.vibration * moved_s * moved_s if beyond > 0.0 else 0.0
     walk, walk_down = FREED_WALK_M_S2_RT_S * (factor.level - 1.0), FREED_WALK_M_S2_RT_S * (factor.down - 1.0)
     return Shaken(
@@ -111,8 +112,7 @@ def add_vibration_noise(m: ImuMemory, step: MotionStep, factor: AccelFactors, *,
 def limit_biases(m: ImuMemory, start: StartMemory, factor: AccelFactors, b: Biases, *, s: ImuSettings) -> Biases:
     """Both biases held to what such sensors, and this vibration, can make: the last resort."""
     beyond = vibration_beyond(m, s)
-    level = s.accel_bias_limit_m_s2 + s.vibration_bias_share * beyond
-    down = s.accel_bias_limit_m_s2 + s.vibration_bias_share * larger(beyond, m.doubt_m_s2)
+    level = down = s.accel_bias_limit_m_s2 + s.vibration_bias_share * larger(beyond, m.doubt_m_s2)
     at_start = BIAS_LIMIT_SIGMAS * np.sqrt(start.shaken)
     level += (factor.level - 1.0) * s.accel_bias_limit_m_s2 + at_start
     down += (factor.down - 1.0) * s.accel_bias_limit_m_s2 + at_start

@@ -12,9 +12,9 @@ from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GPS_FAST, GPS_SLOW, 
 from flownav.navigation import verdicts
 from flownav.navigation.compass import check_compass
 from flownav.navigation.course import FOUND_RAD, LEAST_TRAVEL_M, find_heading
-from flownav.navigation.gps import UNKNOWN_PAD_M, AlongAxis, compare_level, judge_fate
+from flownav.navigation.gps import UNKNOWN_PAD_M, AlongAxis, judge_fate
 from flownav.navigation.motion_records import CourseMemory, PushMemory
-from flownav.navigation.offers import note_aid, note_aid_age, note_height
+from flownav.navigation.offers import compare_level, note_aid, note_aid_age, note_height
 from flownav.navigation.place import (
     LEFT,
     MANY_STRAYS,
@@ -34,6 +34,7 @@ from flownav.navigation.records import (
     FlowMemory,
     GpsMemory,
     HeadingMemory,
+    LevelMemory,
     PadMemory,
     Reading,
     RejectionMemory,
@@ -128,7 +129,7 @@ def test_gps_tells_where_north_or_east_is_fused():
 def test_the_level_ratio_is_the_larger_of_north_and_east_of_one_fix():
     def ratio(innovation: float, axis: int, before: float, reason: int = FUSED) -> float:
         tested = verdicts.Tested(reason, innovation * TOLD.gps.gate_sigma, 1.0, 1.0)
-        return float(compare_level.law(tested, GpsMemory(level_ratio=before), axis=axis, s=TOLD.gps).level_ratio)
+        return float(compare_level.law(tested, LevelMemory(before), axis=axis, gate_sigma=TOLD.gps.gate_sigma).ratio)
 
     assert ratio(2.0, 0, 9.0) == pytest.approx(4.0)  # that of the fix before does not count
     assert ratio(1.0, 1, 4.0) == 4.0

@@ -15,12 +15,12 @@ from flownav.navigation.attitude import read_attitude
 from flownav.navigation.baro import judge_baro
 from flownav.navigation.flow_judge import judge_look, turning_of
 from flownav.navigation.flow_noise import alike, flow_variance, followed_agreement, lasting_doubt, wrong_since
-from flownav.navigation.gps import LAG_LEFT, judge_fix, judge_rejections
+from flownav.navigation.gps import LAG_LEFT, add_lag, follow_fix_noise, judge_fix, judge_rejections
 from flownav.navigation.heading import heading_variance, magnetic_heading
 from flownav.navigation.height import creeps, range_variance, range_verdict, repeats
 from flownav.navigation.inertial import motion_between, said_by, sound
 from flownav.navigation.motion_records import ImuMemory, SteadyForce
-from flownav.navigation.place import judge_pad
+from flownav.navigation.place import judge_pad, judge_pose
 from flownav.navigation.reasons import (
     BEFORE_START,
     FUSED,
@@ -42,8 +42,8 @@ from flownav.navigation.reasons import (
 from flownav.navigation.records import (
     BaroMemory,
     FlowMemory,
-    GpsMemory,
     HeadingMemory,
+    LevelMemory,
     Look,
     NoiseMemory,
     RangeMemory,
@@ -55,7 +55,8 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tape import BARO_FOUND
 from flownav.navigation.told import NO_HEADING as HEADLESS
 from flownav.navigation.told import Equipment
-from flownav.navigation.verdicts import Event, Height, Offer, Reset
+from flownav.navigation.trust import OF_GPS
+from flownav.navigation.verdicts import Event, Height, Noise, Offer, Reset
 from flownav.navigation.verdicts import Tested as Outcome
 from flownav.navigation.vibration import followed_vibration, vibration_beyond, with_reading
 
@@ -94,12 +95,12 @@ def test_what_is_said_of_any_reading_stands_in_this_order():
 
 
 # -- GPS -----------------------------------------------------------------------------------------------------
-CALM = SteadyForce(0.0, 0.0, -GRAVITY_M_S2)
+PUSHED = SteadyForce(3.0, 0.0, -GRAVITY_M_S2 - 4.0)  # by 5 m/s2
 
 
-def judged_fix(fix: Reading, axis: int, *, level_ratio: float = 0.0, position=True, alone=False, steady=CALM):
-    memory = GpsMemory(level_ratio=level_ratio)
-    return judge_fix.law(fix, StartMemory(1.0), memory, steady, axis=axis, position=position, alone=alone, s=TOLD.gps)
+def judged_fix(fix: Reading, axis: int, *, level_ratio: float = 0.0, position=True, alone=False):
+    memory = LevelMemory(level_ratio)
+    return judge_fix.law(fix, StartMemory(1.0), memory, axis=axis, position=position, alone=alone, s=TOLD.gps)
 
 
 def test_the_noise_of_a_fix_is_its_white_part_and_a_share_of_what_it_states():
@@ -112,10 +113,40 @@ def test_the_noise_of_a_fix_is_its_white_part_and_a_share_of_what_it_states():
     unsaid = reading(1.0, 2.0, 3.0)
     for axis, sigma in ((2, s.gps_velocity_white_down_m_s), (0, s.gps_velocity_white_m_s)):
         assert judged_fix(unsaid, axis, position=False) == (axis + 1.0, pytest.approx(sigma**2), FUSED)
-        pushed = {"steady": SteadyForce(3.0, 0.0, -GRAVITY_M_S2 - 4.0)}
-        lagging = (LAG_LEFT * s.gps_velocity_lag_sigma_s * 5.0) ** 2
-        assert judged_fix(unsaid, axis, position=False, **pushed).variance == pytest.approx(sigma**2 + lagging)
-        assert judged_fix(unsaid, axis, **pushed) == judged_fix(unsaid, axis)  # a place does not lag so
+
+
+def test_a_velocity_errs_by_what_a_receivers_lag_leaves_over_and_that_is_not_learnt_away():
+    s = TOLD.gps
+    lagging = (LAG_LEFT * s.gps_velocity_lag_sigma_s * 5.0) ** 2
+    assert add_lag.law(Noise(0.04), StartMemory(1.0), PUSHED, s=s).variance == pytest.approx(0.04 + lagging)
+    assert add_lag.law(Noise(0.04), StartMemory(0.0), PUSHED, s=s).variance == 0.04
+
+    def followed(place: int) -> float:
+        """The factor after 40 s in which a noise of 0.2 m/s is what it is said to be."""
+        m, rng = NoiseMemory(), np.random.default_rng(1)
+        for i, nu in enumerate(0.2 * rng.standard_normal(200)):
+            total = 0.04 * m.factor + (lagging if place > OF_GPS + 2 else 0.0)
+            tested = Outcome(FUSED, nu, total + 0.01, total)
+            m = follow_fix_noise.law(tested, StartMemory(1.0), PUSHED, m, t_s=0.2 * i, place=place, s=s)
+        return m.factor
+
+    assert followed(OF_GPS + 3) == followed(OF_GPS)  # of a velocity as of a place, which does not lag
+    assert followed(OF_GPS) == pytest.approx(1.0, abs=0.15)
+    refused = Outcome(INNOVATION_GATE, 9.0, 0.05, 0.04)
+    m = NoiseMemory()
+    assert follow_fix_noise.law(refused, StartMemory(1.0), PUSHED, m, t_s=1.0, place=OF_GPS, s=s) == m
+
+
+def test_an_external_pose_that_jumps_along_one_axis_is_refused_along_both_and_keeps_its_height():
+    def reason(axis: int, ratio: float = 1.1, alone: bool = False) -> int:
+        judged = judge_pose.law(
+            reading(1.0, 2.0, 3.0), StartMemory(1.0), LevelMemory(ratio), axis=axis, alone=alone, s=TOLD.place
+        )
+        return judged.reason
+
+    assert [reason(axis) for axis in range(3)] == [INNOVATION_GATE, INNOVATION_GATE, FUSED]
+    assert reason(0, alone=True) == FUSED
+    assert reason(0, 1.0) == FUSED
 
 
 def test_a_fix_that_jumps_along_one_axis_is_refused_along_both_and_keeps_its_height():

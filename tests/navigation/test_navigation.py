@@ -172,6 +172,21 @@ def test_an_external_pose_is_enough():
     assert run.events("filter", "start")[:, 1] == pytest.approx([0.0])
 
 
+def test_a_pose_that_is_50_m_off_to_the_north_and_2_to_the_east_is_refused_as_a_whole():
+    """Axis by axis, its east would be believed after a second without one."""
+    flown = fly(circle, 20.0, 0.2).only(Sensor.IMU)
+    t_s = np.concatenate([np.arange(0.2, 12.0, 0.05), [14.0], np.arange(15.0, 20.0, 0.05)])
+    pose = flown.at(t_s, flown.position - flown.position[1000]) + np.where(t_s == 14.0, 1.0, 0.0)[:, None] * [
+        50.0,
+        2.0,
+        0.0,
+    ]
+    run = navigate(flown.added(Stream.of(Sensor.POSE, t_s, pose)))
+    truth = flown.at(run.t_s, flown.position - flown.position[1000])
+    assert np.abs(run.said.pos_ned_m - truth)[:, 1].max() < 0.5
+    assert run.reasons(Sensor.POSE)["innovation_gate"] == 2
+
+
 def test_an_external_heading_is_taken():
     """With an earth frame and without, after the start and, however far it is from north, before it."""
     flown = late = fly(still, 20.0, 0.3).without(Sensor.ATTITUDE, Sensor.MAG)

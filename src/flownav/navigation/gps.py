@@ -13,15 +13,32 @@ from flownav.estimation.laws.still import pad_below
 from flownav.estimation.states import GPS_FAST, GPS_SLOW, GPS_VELOCITY, PAD, POSITION, STATE, VELOCITY
 from flownav.navigation.memory import MEMORY
 from flownav.navigation.motion_records import SteadyForce
-from flownav.navigation.offers import conclude, fuse_offered, note_aid, note_height
+from flownav.navigation.offers import (
+    compare_level,
+    conclude,
+    fuse_offered,
+    gate_ratio,
+    judged_whole,
+    note_aid,
+    note_height,
+)
 from flownav.navigation.packed import load_gps_settings
 from flownav.navigation.protection import sign_drift
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT, component_of, usable
-from flownav.navigation.records import FixMemory, FlowMemory, GpsMemory, Reading, RejectionMemory, StartMemory
+from flownav.navigation.records import (
+    FixMemory,
+    FlowMemory,
+    GpsMemory,
+    LevelMemory,
+    NoiseMemory,
+    Reading,
+    RejectionMemory,
+    StartMemory,
+)
 from flownav.navigation.tape import GPS_RESET, Output
 from flownav.navigation.told import GpsSettings
-from flownav.navigation.trust import OF_GPS, follow_noise, scale_noise
-from flownav.navigation.verdicts import Event, Force, Offer, Reset, Tested, on_lanes
+from flownav.navigation.trust import OF_GPS, SMALLEST_NOISE, followed_noise, scale_noise
+from flownav.navigation.verdicts import Event, Force, Noise, Offer, Reset, Tested, on_lanes
 
 LAG_LEFT = 0.3  # chosen: half of it is as good, with none v is too sure in a tail wind (test_wind_from_all_sides)
 LEAST_REJECTIONS = 5  # chosen: a second of a 5 Hz receiver; one refusal alone is none (test_judges)
@@ -29,7 +46,6 @@ SOON_S = 1.0  # with 7 s a flow of the wrong sign carried the vehicle 84 m off, 
 UNKNOWN_PAD_M = 100.0  # as good as unknown: the tie to the vehicle that follows tells it
 LEAST_PAD_VARIANCE_M2 = 1e-6  # chosen: 1 mm, so that a tie is never exact
 
-with_ratio = replacing(GpsMemory, "level_ratio")
 with_reset = replacing(GpsMemory, "told_s", "moved_n_m", "moved_e_m")
 
 
@@ -63,26 +79,47 @@ MEMORY.derive(AlongAxis, along_axis, "axis")
 # -- one axis of a fix ----------------------------------------------------------------------------------------
 @on_lanes
 def judge_fix(
-    reading: Reading, start: StartMemory, m: GpsMemory, steady: SteadyForce,
-    *, axis: int, position: bool, alone: bool, s: GpsSettings,
-) -> Offer:  # fmt: skip
+    reading: Reading, start: StartMemory, m: LevelMemory, *, axis: int, position: bool, alone: bool, s: GpsSettings
+) -> Offer:
     """One axis of a fix: the variance is the white part of its noise, and a share of the accuracy that it states.
 
-    A velocity errs the more, the more the vehicle is accelerated: the lag that is estimated (`gps_velocity`) is one
-    number for a smoothing that is none, and leaves over a share LAG_LEFT of its doubt times the acceleration.
-
-    North and east come of one fix, and a jump along one axis spoils both; alone: whatever the other axis says.
+    North and east are judged together; alone: whatever the other axis says.
     """
     value, stated = component_of(reading, axis)
     white_position = s.gps_white_sigma_down_m if axis == 2 else s.gps_white_sigma_m
     white_velocity = s.gps_velocity_white_down_m_s if axis == 2 else s.gps_velocity_white_m_s
     white = white_position if position else white_velocity
     share = s.gps_white_share * s.gps_white_share * (stated if np.isfinite(stated) else 0.0)
-    lag_s = 0.0 if position or start.started == 0.0 else LAG_LEFT * s.gps_velocity_lag_sigma_s
-    variance = white * white + share + lag_s * lag_s * squared_acceleration(steady)
+    variance = white * white + share
     reason = usable(reading, value, variance, start.started)
-    spoilt = reason == FUSED and axis < 2 and m.level_ratio > 1.0 and not alone
-    return Offer(value, variance, INNOVATION_GATE if spoilt else reason)
+    return Offer(value, variance, reason if alone else judged_whole(reason, axis, m))
+
+
+@equation
+def lag_variance(start: StartMemory, steady: SteadyForce, s: GpsSettings) -> float:
+    """What a receiver's smoothing leaves over in its velocity [m2/s2]: the lag that is estimated (`gps_velocity`) is
+    one number for a smoothing that is none, and leaves a share LAG_LEFT of its doubt times the acceleration.
+    """
+    lag_s = LAG_LEFT * s.gps_velocity_lag_sigma_s if start.started > 0.0 else 0.0
+    return lag_s * lag_s * squared_acceleration(steady)
+
+
+@on_lanes
+def add_lag(noise: Noise, start: StartMemory, steady: SteadyForce, *, s: GpsSettings) -> Noise:
+    """A velocity errs the more, the more the vehicle is accelerated."""
+    return Noise(noise.variance + lag_variance(start, steady, s))
+
+
+@on_lanes
+def follow_fix_noise(
+    tested: Tested, start: StartMemory, steady: SteadyForce, m: NoiseMemory,
+    *, t_s: float, place: int, s: GpsSettings,
+) -> NoiseMemory:  # fmt: skip
+    """After the test: an axis that was fused teaches its white noise; what a lag leaves over lasts, and is none."""
+    if tested.reason != FUSED:
+        return m
+    white = tested.variance - (0.0 if place < OF_GPS + 3 else lag_variance(start, steady, s))
+    return followed_noise(tested.innovation, tested.total, white, SMALLEST_NOISE, s.gate_sigma, t_s, m)
 
 
 @equation
@@ -90,20 +127,6 @@ def squared_acceleration(steady: SteadyForce) -> float:
     """Square of the vehicle's acceleration [m2/s4], of the steady specific force, NED."""
     down_m_s2 = steady.down_m_s2 + GRAVITY_M_S2
     return steady.north_m_s2 * steady.north_m_s2 + steady.east_m_s2 * steady.east_m_s2 + down_m_s2 * down_m_s2
-
-
-@equation
-def gate_ratio(tested: Tested, gate_sigma: float) -> float:
-    """The square of the innovation over what the gate lets pass."""
-    return tested.innovation * tested.innovation / (gate_sigma * gate_sigma * tested.total)
-
-
-@on_lanes
-def compare_level(tested: Tested, m: GpsMemory, *, axis: int, s: GpsSettings) -> GpsMemory:
-    """The larger test ratio of north and east, once both are compared; 0 where the fix cannot be offered."""
-    before = m.level_ratio if axis > 0 else 0.0
-    ratio = gate_ratio(tested, s.gate_sigma)
-    return with_ratio(m, level_ratio=ratio if tested.reason == FUSED and ratio > before else before)
 
 
 @on_lanes
@@ -210,16 +233,20 @@ def take_gps(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Outp
         smooth_force(work, lanes)
     for axis in range(2):
         offer_axis(work, lanes, axis, position, True, s)
+        if not position:
+            add_lag(work, lanes, s)
         expect(work, lanes, states_of(lanes), True)
-        compare_level(work, lanes, axis, s)
+        compare_level(work, lanes, axis, s.gate_sigma)
     for axis in range(3):
         state = axis if position else 3 + axis
         offer_axis(work, lanes, axis, position, False, s)
         scale_noise(work, lanes, OF_GPS + state)
         if position:
             sign_drift(work, lanes, t_s, axis)
+        else:
+            add_lag(work, lanes, s)
         conclude(work, lanes, t_s, sensor, axis, s.gate_sigma, o)
-        follow_noise(work, lanes, t_s, OF_GPS + state, s.gate_sigma)
+        follow_fix_noise(work, lanes, t_s, OF_GPS + state, s)
         if axis < 2:
             note_aid(work, lanes, t_s, o)
         elif position:

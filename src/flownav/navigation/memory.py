@@ -46,6 +46,7 @@ from flownav.navigation.records import (
     GpsMemory,
     GroundMemory,
     HeadingMemory,
+    LevelMemory,
     Levels,
     Look,
     NoiseMemory,
@@ -86,6 +87,7 @@ MEMORY.keep(PushMemory)
 MEMORY.keep(StandMemory)
 MEMORY.keep(BaroMemory)
 MEMORY.keep(GpsMemory)
+MEMORY.keep(LevelMemory)
 MEMORY.keep(PadMemory)
 PAD_KNOWN = MEMORY.row(PadMemory, "known")
 HEADING_SOUGHT = MEMORY.row(HeadingMemory, "sought")

@@ -18,7 +18,7 @@ from flownav.navigation.reasons import (
     NOT_FINITE,
     SILENT,
 )
-from flownav.navigation.records import AidMemory, EchoMemory, Reading
+from flownav.navigation.records import AidMemory, EchoMemory, LevelMemory, Reading
 from flownav.navigation.tape import AIDED_AGAIN, DEAD_RECKONING, POSITION_INVALID, Output, write_offer
 from flownav.navigation.told import AidSettings
 from flownav.navigation.verdicts import Accepted, Event, Fate, Noise, Observation, Offered, Tested, on_lanes
@@ -109,6 +109,27 @@ def fuse_offered(work: Work, lanes: Lanes, gate_sigma: float, o: Output) -> None
     note_refusal(work, lanes)
     if len(lanes) == 1:
         note_correction(work, lanes, o)
+
+
+# -- a place as a whole -----------------------------------------------------------------------------------
+@equation
+def gate_ratio(tested: Tested, gate_sigma: float) -> float:
+    """The square of the innovation over what the gate lets pass."""
+    return tested.innovation * tested.innovation / (gate_sigma * gate_sigma * tested.total)
+
+
+@on_lanes
+def compare_level(tested: Tested, m: LevelMemory, *, axis: int, gate_sigma: float) -> LevelMemory:
+    """The larger test ratio of north and east, once both are compared; 0 where neither can be offered."""
+    before = m.ratio if axis > 0 else 0.0
+    ratio = gate_ratio(tested, gate_sigma)
+    return LevelMemory(ratio if tested.reason == FUSED and ratio > before else before)
+
+
+@equation
+def judged_whole(reason: int, axis: int, m: LevelMemory) -> int:
+    """North and east come of one place, and a jump along one axis spoils both."""
+    return INNOVATION_GATE if reason == FUSED and axis < 2 and m.ratio > 1.0 else reason
 
 
 # -- a reading among strays -------------------------------------------------------------------------------

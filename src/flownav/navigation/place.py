@@ -6,12 +6,13 @@ import numpy as np
 
 from flownav.core.compile import Lanes, Work, equation, procedure, replacing
 from flownav.core.frames import to_earth
+from flownav.estimation.covariance import expect, states_of
 from flownav.estimation.laws.pad import pad_fix
 from flownav.estimation.laws.still import pad_below, position_itself, velocity_itself
 from flownav.estimation.named import Attitude, PositionNed, rotation_by
 from flownav.estimation.states import MEASURED, PAD, STATE
 from flownav.navigation.memory import MEMORY
-from flownav.navigation.offers import conclude, fuse_offered, note_aid, note_height
+from flownav.navigation.offers import compare_level, conclude, fuse_offered, judged_whole, note_aid, note_height
 from flownav.navigation.packed import load_place_settings
 from flownav.navigation.reasons import (
     FUSED,
@@ -22,7 +23,7 @@ from flownav.navigation.reasons import (
     usable,
     usable_in_flight,
 )
-from flownav.navigation.records import AidMemory, PadMemory, Reading, StartMemory
+from flownav.navigation.records import AidMemory, LevelMemory, PadMemory, Reading, StartMemory
 from flownav.navigation.tape import PAD_FOUND, Output
 from flownav.navigation.told import PlaceSettings
 from flownav.navigation.verdicts import UNKNOWN_M, Event, Fate, Offer, Reset, on_lanes
@@ -76,19 +77,29 @@ def pad_at(north_m: float, east_m: float, down_m: float, goes: bool) -> tuple[Re
 
 # -- an external position -----------------------------------------------------------------------------------
 @on_lanes
-def judge_pose(reading: Reading, start: StartMemory, *, axis: int, s: PlaceSettings) -> Offer:
-    """One axis of an external position, as sure as it says or is told."""
+def judge_pose(
+    reading: Reading, start: StartMemory, m: LevelMemory, *, axis: int, alone: bool, s: PlaceSettings
+) -> Offer:
+    """One axis of an external position, as sure as it says or is told. North and east are judged together; alone:
+    whatever the other axis says.
+    """
     value, stated = component_of(reading, axis)
     variance = stated if np.isfinite(stated) else s.pose_sigma_m * s.pose_sigma_m
-    return Offer(value, variance, usable(reading, value, variance, start.started))
+    reason = usable(reading, value, variance, start.started)
+    return Offer(value, variance, reason if alone else judged_whole(reason, axis, m))
 
 
 @procedure
 def take_pose(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
     """An external position in the local frame."""
     s = load_place_settings(p)
+    for axis in range(2):
+        judge_pose(work, lanes, axis, True, s)
+        position_itself(work, lanes, axis)
+        expect(work, lanes, states_of(lanes), True)
+        compare_level(work, lanes, axis, s.gate_sigma)
     for axis in range(3):
-        judge_pose(work, lanes, axis, s)
+        judge_pose(work, lanes, axis, False, s)
         position_itself(work, lanes, axis)
         conclude(work, lanes, t_s, sensor, axis, s.gate_sigma, o)
         if axis < 2:

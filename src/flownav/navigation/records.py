@@ -184,13 +184,18 @@ class WhitenessMemory(NamedTuple):
     factor: float = 1.0
 
 
+class LevelMemory(NamedTuple):
+    """ratio: the larger test ratio of north and east of the place, or velocity, at hand."""
+
+    ratio: float = 0.0
+
+
 class GpsMemory(NamedTuple):
-    """told_s: when GPS told north or east last; level_ratio: the larger test ratio of north and east of the fix at
-    hand; moved_n_m and moved_e_m: how far resets to GPS moved the position, back and forth added up.
+    """told_s: when GPS told north or east last; moved_n_m and moved_e_m: how far resets to GPS moved the position,
+    back and forth added up.
     """
 
     told_s: float = -inf
-    level_ratio: float = 0.0
     moved_n_m: float = 0.0
     moved_e_m: float = 0.0
 

@@ -55,9 +55,9 @@ from flownav.navigation.vibration import doubted_imu
 # Refused so long, a range that alone tells the height is believed, not the accelerometer: chosen; at once, a lone echo
 # would make the accelerometer doubted.
 DOUBTING_S = 0.05
-# Of the gate: the last range that was fused lay beyond the first, the first that is refused within the second. White
-# innovations lie beyond half a gate of 5 standard deviations once in 80. With 0.25 to 0.5 and 1.2 to 4 the tests hold.
-CREPT, JUMPED = 0.5, 2.0
+# Innovations lean to one side before a range creeps out of its gate: their exponential mean has 0.58 standard deviations
+# of one where they are white, and lies beyond CREPT_SIGMAS once in a hundred. The first refused is within JUMPED gates.
+LEANING_SHARE, CREPT_SIGMAS, JUMPED = 0.5, 1.5, 2.0
 AGREEMENT_M, AGREEMENT_SHARE = 0.2, 0.05  # ranges of one ground agree so far: chosen, not measured
 LEAST_AGREEING = 3.0  # one echo finds no ground; a roof of 1.2 m is found after 1.45 s (test_navigation_safeguards)
 STILL_S = 1.0  # a range that repeats itself so long while a ground is sought is of a vehicle that stands: not measured
@@ -245,7 +245,7 @@ class Refusal(NamedTuple):
 def creeps(tested: Tested, m: RangeMemory, gate_sigma: float) -> bool:
     """Whether a range has left its gate step by step: the motion errs then, where a step of the ground jumps out."""
     sigmas = tested.innovation / np.sqrt(tested.total)
-    return m.sigmas * sigmas > 0.0 and abs(m.sigmas) > CREPT * gate_sigma and abs(sigmas) < JUMPED * gate_sigma
+    return m.sigmas * sigmas > 0.0 and abs(m.sigmas) > CREPT_SIGMAS and abs(sigmas) < JUMPED * gate_sigma
 
 
 @on_lanes
@@ -280,7 +280,8 @@ def judge_refusal(
     below_m = height.pos_d_m + (reading.value_0 + s.range_below_m) * height.upright
     followed = judge_ground(below_m, reading.value_0, t_s, False, g)[1]
     after = with_taken(m, taken_s=t_s if fused else m.taken_s, refused_s=np.nan) if ends else m
-    after = with_sigmas(after, sigmas=tested.innovation / np.sqrt(tested.total) if fused else after.sigmas)
+    leaning = m.sigmas + LEANING_SHARE * (tested.innovation / np.sqrt(tested.total) - m.sigmas)
+    after = with_sigmas(after, sigmas=leaning if fused else m.sigmas)
     after = with_refusal(after, refused_s=since_s, doubted=1.0 if doubts else doubted_before) if refused else after
     return Refusal(
         Fate(FUSED if again else SILENT),

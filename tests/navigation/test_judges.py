@@ -287,9 +287,9 @@ def range_memory(**parts) -> RangeMemory:
 
 
 @pytest.mark.parametrize(("before", "refused", "crept"), [
-    (2.6, 5.1, True), (-2.6, -5.1, True), (4.9, 9.9, True),
-    (2.4, 5.1, False),  # it jumped out
-    (-2.6, 5.1, False), (2.6, -5.1, False),  # to the other side
+    (1.6, 5.1, True), (-1.6, -5.1, True), (4.9, 9.9, True),
+    (1.4, 5.1, False),  # it jumped out
+    (-1.6, 5.1, False), (1.6, -5.1, False),  # to the other side
     (4.9, 10.1, False),  # no motion is so wrong between two readings
     (0.0, 5.1, False),  # none was fused yet
 ])  # fmt: skip

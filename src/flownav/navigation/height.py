@@ -55,8 +55,8 @@ from flownav.navigation.vibration import doubted_imu
 # Refused so long, a range that alone tells the height is believed, not the accelerometer: chosen; at once, a lone echo
 # would make the accelerometer doubted.
 DOUBTING_S = 0.05
-# Innovations lean to one side before a range creeps out of its gate: their exponential mean has 0.58 standard deviations
-# of one where they are white, and lies beyond CREPT_SIGMAS once in a hundred. The first refused is within JUMPED gates.
+# Innovations lean to one side before a range creeps out of its gate: where they are white, their exponential mean has a
+# standard deviation of 0.58 and lies beyond CREPT_SIGMAS once in a hundred. The first refused is within JUMPED gates.
 LEANING_SHARE, CREPT_SIGMAS, JUMPED = 0.5, 1.5, 2.0
 AGREEMENT_M, AGREEMENT_SHARE = 0.2, 0.05  # ranges of one ground agree so far: chosen, not measured
 LEAST_AGREEING = 3.0  # one echo finds no ground; a roof of 1.2 m is found after 1.45 s (test_navigation_safeguards)
@@ -234,7 +234,7 @@ class Refusal(NamedTuple):
     fate: Fate
     memory: RangingMemory
     imu: ImuMemory
-    doubts: tuple[Doubt, Doubt, Doubt, Doubt, Doubt]
+    doubts: tuple[Doubt, Doubt, Doubt, Doubt, Doubt, Doubt]
     doubted: Event
     reset: Reset
     found: Event

@@ -63,8 +63,8 @@ class AidMemory(NamedTuple):
 class RangeMemory(NamedTuple):
     """taken_s: of the last range that was fused; refused_s: since when they are refused; last_m and same_s: the last
     value and since when it repeats; down_m: where the vehicle was then; said_s: of the repetition that was reported;
-    doubted: 1 once the accelerometer was doubted for it; sigmas: innovation of the last that was fused, in standard
-    deviations.
+    doubted: 1 once the accelerometer was doubted for it; sigmas: exponential mean of the innovations that were
+    fused, in standard deviations.
     """
 
     taken_s: float = -inf

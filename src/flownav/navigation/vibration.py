@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.compile import clamp, equation, larger, replacing, smaller
-from flownav.estimation.states import ACCEL_BIAS, POSITION, VELOCITY
+from flownav.estimation.states import ACCEL_BIAS, GROUND, POSITION, VELOCITY
 from flownav.navigation.motion_records import ImuMemory, MotionStep
 from flownav.navigation.records import Reading, StartMemory
 from flownav.navigation.tape import IMU_DOUBTED
@@ -27,6 +27,9 @@ FREED_WALK_M_S2_RT_S = 0.02  # of a bias, for each time that the accelerometer i
 with_doubt = replacing(ImuMemory, "doubt_m_s2")
 
 BIAS_LIMIT_SIGMAS = 3.0  # standard deviations that a limit leaves room for: chosen, as in `settings_of`
+# The ground has followed a height that errs: as many times what the range still contradicts may both be off. With 1 the
+# height of `flownav faults --offline --faults imu_bias` is beyond 3 sigma for 12 s unsaid, with 3 for 1 s.
+WITH_GROUND = 3.0
 DOUBTED_SPEED_M_S = 1.0  # what it may have done to the velocity: half a second of DOUBT_M_S2
 
 
@@ -56,14 +59,16 @@ def vibration_beyond(m: ImuMemory, s: ImuSettings) -> float:
 @equation
 def doubted_imu(
     contradiction_m: float, doubted: bool, m: ImuMemory
-) -> tuple[ImuMemory, Event, tuple[Doubt, Doubt, Doubt, Doubt, Doubt]]:
-    """The range contradicts the motion that the accelerometer made: height, its velocity and all biases are set free.
+) -> tuple[ImuMemory, Event, tuple[Doubt, Doubt, Doubt, Doubt, Doubt, Doubt]]:
+    """The range contradicts the motion that the accelerometer made: height, ground, climb and all biases are set free.
 
     The memory, what is said of it, and the doubts; where not doubted, all as before.
     """
     says = doubted and m.doubt_m_s2 < 0.5 * DOUBT_M_S2
+    off_m = WITH_GROUND * contradiction_m if doubted else 0.0
     freed = (
-        Doubt(POSITION + 2, contradiction_m * contradiction_m if doubted else 0.0),
+        Doubt(POSITION + 2, off_m * off_m),
+        Doubt(GROUND, off_m * off_m),
         Doubt(VELOCITY + 2, DOUBTED_SPEED_M_S * DOUBTED_SPEED_M_S if doubted else 0.0),
         Doubt(ACCEL_BIAS, DOUBT_M_S2 * DOUBT_M_S2 if doubted else 0.0),
         Doubt(ACCEL_BIAS + 1, DOUBT_M_S2 * DOUBT_M_S2 if doubted else 0.0),

@@ -58,20 +58,21 @@ def vibration_beyond(m: ImuMemory, s: ImuSettings) -> float:
 
 @equation
 def doubted_imu(
-    contradiction_m: float, doubted: bool, m: ImuMemory
+    contradiction_m: float, doubted: bool, crept: bool, m: ImuMemory
 ) -> tuple[ImuMemory, Event, tuple[Doubt, Doubt, Doubt, Doubt, Doubt, Doubt]]:
-    """The range contradicts the motion that the accelerometer made: height, ground, climb and all biases are set free.
+    """The range contradicts the motion that the accelerometer made: height, climb and vertical bias are set free.
 
-    The memory, what is said of it, and the doubts; where not doubted, all as before.
+    Where the range crept, the ground followed the height before, and the accelerometer may err on every axis; where it
+    jumped, it may be an echo. The memory, what is said of it, and the doubts; where not doubted, all as before.
     """
     says = doubted and m.doubt_m_s2 < 0.5 * DOUBT_M_S2
     off_m = WITH_GROUND * contradiction_m if doubted else 0.0
     freed = (
         Doubt(POSITION + 2, off_m * off_m),
-        Doubt(GROUND, off_m * off_m),
+        Doubt(GROUND, off_m * off_m if crept else 0.0),
         Doubt(VELOCITY + 2, DOUBTED_SPEED_M_S * DOUBTED_SPEED_M_S if doubted else 0.0),
-        Doubt(ACCEL_BIAS, DOUBT_M_S2 * DOUBT_M_S2 if doubted else 0.0),
-        Doubt(ACCEL_BIAS + 1, DOUBT_M_S2 * DOUBT_M_S2 if doubted else 0.0),
+        Doubt(ACCEL_BIAS, DOUBT_M_S2 * DOUBT_M_S2 if crept else 0.0),
+        Doubt(ACCEL_BIAS + 1, DOUBT_M_S2 * DOUBT_M_S2 if crept else 0.0),
         Doubt(ACCEL_BIAS + 2, DOUBT_M_S2 * DOUBT_M_S2 if doubted else 0.0),
     )
     after = with_doubt(m, doubt_m_s2=DOUBT_M_S2 if doubted else m.doubt_m_s2)

@@ -105,5 +105,5 @@ def _memory(flights: int) -> Figure:
             "print(re.search(r'VmHWM:\\s*(\\d+)', open('/proc/self/status').read())[1])\n"  # of this process alone
         )
         done = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
-    megabytes = int(done.stdout.split()[-1]) / 1024.0
-    return Figure(f"peak memory, a campaign of {flights} flights with its page", megabytes, "MB", 300.0, False)
+    mebibytes = int(done.stdout.split()[-1]) / 1024.0
+    return Figure(f"peak memory, a campaign of {flights} flights with its page", mebibytes, "MiB", 300.0, False)

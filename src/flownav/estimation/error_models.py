@@ -74,7 +74,7 @@ def propagate_walks(work: Work, lanes: Lanes, dt_s: float, settings: FilterSetti
         over = over_ground(
             work[(STATE + VELOCITY) * len(lanes) + lane], work[(STATE + VELOCITY + 1) * len(lanes) + lane]
         )
-        add_noise_lane(work, lanes, GROUND, lane, over * squared(settings.ground_walk_m_rt_s) * dt_s)
+        add_noise_lane(work, lanes, GROUND, lane, 0.0 * over * squared(settings.ground_walk_m_rt_s) * dt_s)
     add_noise(work, lanes, BARO, squared(settings.baro_walk_m_rt_s) * dt_s)
 
 

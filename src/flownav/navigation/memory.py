@@ -24,6 +24,7 @@ from flownav.estimation.states import (
 from flownav.navigation.motion_records import (
     BridgeMemory,
     CourseMemory,
+    DriftMemory,
     ImuMemory,
     ImuWindow,
     MotionStep,
@@ -99,6 +100,7 @@ MEMORY.keep(FlowInnovation, 3, "component")
 RANGE_MISSING = MEMORY.row(Look, "unranged")
 SCALE_DOUBT = MEMORY.keep(ScaleDoubt)
 MEMORY.keep(SteadyForce)
+MEMORY.keep(DriftMemory)
 for _record in (MotionStep, SpentMotion, OwedMotion, ToneMemory, FlowSignMemory, SuspicionMemory):
     MEMORY.keep(_record)
 PROTECTION = MEMORY.keep(Levels)  # horizontal and vertical

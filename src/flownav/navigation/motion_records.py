@@ -195,6 +195,14 @@ class ToneMemory(NamedTuple):
     mean_z: float = 0.0
 
 
+class DriftMemory(NamedTuple):
+    """Velocity over the ground NED [m/s] without sways about one place."""
+
+    north_m_s: float = 0.0
+    east_m_s: float = 0.0
+    down_m_s: float = 0.0
+
+
 class SteadyForce(NamedTuple):
     """Specific force NED [m/s2], smoothed as a GPS receiver smooths its velocity."""
 

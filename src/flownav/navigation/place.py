@@ -4,15 +4,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.core.compile import Lanes, Work, equation, procedure, replacing
+from flownav.core.compile import Lanes, Work, equation, larger, procedure, replacing
 from flownav.core.frames import to_earth
 from flownav.estimation.covariance import expect, states_of
 from flownav.estimation.laws.pad import pad_fix
 from flownav.estimation.laws.still import pad_below, position_itself, velocity_itself
-from flownav.estimation.named import Attitude, PositionNed, rotation_by
+from flownav.estimation.named import Attitude, PositionNed, VelocityNed, rotation_by
 from flownav.estimation.states import MEASURED, PAD, STATE
 from flownav.navigation.memory import MEMORY
 from flownav.navigation.offers import compare_level, conclude, fuse_offered, judged_whole, note_aid, note_height
+from flownav.navigation.motion_records import ImuMemory
 from flownav.navigation.packed import load_place_settings
 from flownav.navigation.reasons import (
     FUSED,
@@ -32,6 +33,7 @@ LEAST_PAD_DISTANCE_M = 0.05  # chosen: no camera on board is so near its pad; ha
 # Refused components of fixes, no whole fix fused between: chosen. Without it a first fix of something else stays the
 # pad (test_a_pad_first_seen_where_there_is_none_is_found_where_it_is; 13 of 480 approaches landed metres beside).
 MANY_STRAYS = 6.0
+LEAST_WHITE_SHARE = 0.02
 ON_GROUND = 0.5  # between 0 and 1
 FLOWN_S = 5.0  # chosen: a skid switch that bounces, or a detector that has not made up its mind, is no flight
 STANDING_SIGMA_M = 0.005  # chosen, not measured: how skids settle
@@ -123,7 +125,18 @@ def judge_pad(reading: Reading, component: int, started: float, s: PlaceSettings
     told = stated if component == 2 else stated * across
     reason = usable_in_flight(reading, reading.value_0 + reading.value_1 + distance, 0.0, started)
     near = distance < LEAST_PAD_DISTANCE_M
-    return OUT_OF_RANGE if reason == FUSED and near else reason, told if np.isfinite(stated) else sigma * sigma
+    lasts = (s.pad_scale_sigma if component == 2 else s.pad_boresight_sigma_rad) * distance
+    whole = told if np.isfinite(stated) else sigma * sigma
+    white = larger(whole - lasts * lasts, LEAST_WHITE_SHARE * whole)
+    return OUT_OF_RANGE if reason == FUSED and near else reason, white
+
+
+@equation
+def late_variance(velocity: VelocityNed, m: ImuMemory, distance_m: float, component: int, s: PlaceSettings) -> float:
+    """What an instant that is stamped wrongly makes of a pad fix [m2]: how far the pad passes by meanwhile."""
+    u, v, w = velocity
+    turning = (m.gyro_x * m.gyro_x + m.gyro_y * m.gyro_y) * distance_m * distance_m if component < 2 else 0.0
+    return s.pad_time_sigma_s * s.pad_time_sigma_s * (u * u + v * v + w * w + turning)
 
 
 class FoundPad(NamedTuple):
@@ -161,9 +174,12 @@ class PadOffer(NamedTuple):
 
 
 @on_lanes
-def judge_sight(reading: Reading, start: StartMemory, *, component: int, s: PlaceSettings) -> PadOffer:
+def judge_sight(
+    reading: Reading, start: StartMemory, velocity: VelocityNed, m: ImuMemory, *, component: int, s: PlaceSettings
+) -> PadOffer:
     """One component of a pad fix."""
-    reason, variance = judge_pad(reading, component, start.started, s)
+    reason, fixed = judge_pad(reading, component, start.started, s)
+    variance = fixed + late_variance(velocity, m, reading.value_2, component, s)
     value, _ = component_of(reading, component)
     return PadOffer(Offer(value, variance, reason), Sight(reading.value_0, reading.value_1, reading.value_2))
 

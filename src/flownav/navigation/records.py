@@ -6,6 +6,8 @@ A field's default is what it is before anything was heard.
 from math import inf, nan
 from typing import NamedTuple
 
+from flownav.core.frames import GRAVITY_M_S2
+
 
 class Reading(NamedTuple):
     """One reading of one sensor, its values as `measurement.COLUMNS` has them and the variances that it states.
@@ -30,7 +32,8 @@ class Reading(NamedTuple):
 
 class StartMemory(NamedTuple):
     """started: 1 once the filter runs. Before that, the newest attitude that was read and its time [s], the mean
-    specific force [m/s2] of so many readings, the mean square of an axis about it [m2/s4], and when the first came [s].
+    specific force [m/s2] of so many readings, the mean square of an axis about it [m2/s4], when the first came [s], and
+    the specific force without its vibration (body FRD [m/s2]).
     """
 
     started: float = 0.0
@@ -45,6 +48,9 @@ class StartMemory(NamedTuple):
     readings: float = 0.0
     shaken: float = 0.0
     since_s: float = 0.0
+    felt_x: float = 0.0
+    felt_y: float = 0.0
+    felt_z: float = -GRAVITY_M_S2
 
 
 class AidMemory(NamedTuple):

@@ -264,6 +264,9 @@ def of_pad_camera(sheet: PadCameraSheet) -> Keys:
     return {
         "pad_angle_sigma_rad": math.hypot(1e-3 * sheet.angle_sigma_mrad, boresight),
         "pad_distance_sigma": 0.01 * sheet.distance_sigma_percent,
+        "pad_boresight_sigma_rad": boresight,
+        "pad_scale_sigma": 0.01 * sheet.scale_percent,
+        "pad_time_sigma_s": sheet.jitter_s / math.sqrt(3.0),
         "pad_forward_m": sheet.lens.forward_m,
         "pad_right_m": sheet.lens.right_m,
         "pad_below_m": sheet.lens.down_m,
@@ -277,7 +280,8 @@ def of_range_sensor(sheet: RangeSensorSheet) -> Keys:
         "range_sigma_m": max(
             math.hypot(sheet.sigma_m, sheet.resolution_m / math.sqrt(12.0), sheet.offset_sigma_m), 1e-3
         ),
-        "range_relative_sigma": 0.01 * math.hypot(sheet.sigma_percent, SCALE_SHARE * sheet.scale_percent),
+        "range_relative_sigma": 0.01 * sheet.sigma_percent,
+        "range_scale_sigma": 0.01 * SCALE_SHARE * sheet.scale_percent,
         "range_min_m": sheet.floor_m + ABOVE_FLOOR_M,
         "range_max_m": sheet.ceiling_m,
         "range_forward_m": sheet.lens.forward_m,

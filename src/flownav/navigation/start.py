@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.compile import Lanes, Work, arctan2, equation, larger, procedure, replacing, squared
-from flownav.core.frames import GRAVITY_M_S2, Quaternion, Rotation, quaternion_from_euler
+from flownav.core.frames import GRAVITY_M_S2, Quaternion, Rotation, quaternion_from_euler, to_earth
 from flownav.core.measurement import Sensor
 from flownav.estimation.covariance import begin_lane, lagged, set_covariance, set_variance, states_of
 from flownav.estimation.hypotheses import COUNT, begin_lane_anew
@@ -13,7 +13,7 @@ from flownav.estimation.laws import component
 from flownav.estimation.named import Attitude, PositionNed, rotation_by
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, POSITION, RATE, VELOCITY
 from flownav.navigation.course import with_sought
-from flownav.navigation.inertial import is_possible
+from flownav.navigation.inertial import STEADY_S, is_possible
 from flownav.navigation.lagged_flow import start_lag
 from flownav.navigation.memory import MEMORY
 from flownav.navigation.motion_records import ImuMemory, SteadyForce
@@ -45,6 +45,7 @@ HOVERING_M_S2 = 0.15  # how it may accelerate over that second: chosen; with 0.1
 RECTIFIED_SHARE = 0.1  # of what shakes an accelerometer lasts in its mean: chosen; 1 is the false roll of `landing`
 
 with_force = replacing(StartMemory, "force_x", "force_y", "force_z", "readings", "shaken", "since_s")
+with_felt = replacing(StartMemory, "felt_x", "felt_y", "felt_z")
 with_attitude = replacing(StartMemory, "attitude_s", "qw", "qx", "qy", "qz")
 with_started = replacing(StartMemory, "started")
 
@@ -82,6 +83,18 @@ def levelled(reading: Reading, m: StartMemory, t_s: float) -> StartMemory:
         readings=m.readings + 1.0,
         shaken=m.shaken + share * (square - m.shaken),
         since_s=m.since_s if m.readings > 0.0 else t_s,
+    )
+
+
+@equation
+def felt(reading: Reading, m: StartMemory, dt_s: float) -> StartMemory:
+    """The specific force as it is now, without its vibration; the first as it is read."""
+    share = dt_s / (STEADY_S + dt_s) if m.readings > 0.0 else 1.0
+    return with_felt(
+        m,
+        felt_x=m.felt_x + share * (reading.value_3 - m.felt_x),
+        felt_y=m.felt_y + share * (reading.value_4 - m.felt_y),
+        felt_z=m.felt_z + share * (reading.value_5 - m.felt_z),
     )
 
 
@@ -124,7 +137,7 @@ class Levelled(NamedTuple):
 def note_force(reading: Reading, m: StartMemory, imu: ImuMemory, *, t_s: float) -> Levelled:
     """The latest inertial reading before the start, and the mean specific force."""
     noted = m.started == 0.0 and reading.arrived > 0.0 and is_possible(reading)
-    return Levelled(levelled(reading, m, t_s) if noted else m, with_reading(reading, t_s, imu) if noted else imu)
+    return Levelled(levelled(reading, felt(reading, m, t_s - imu.read_s), t_s) if noted else m, with_reading(reading, t_s, imu) if noted else imu)
 
 
 @procedure
@@ -181,7 +194,8 @@ class Levelling(NamedTuple):
 
 class FirstState(NamedTuple):
     """What a lane starts with beside its settings' standard deviations: its place [m], attitude, accelerometer's bias,
-    their variances, and whether nothing tells it the flow's scale. starts: false where it does not.
+    their variances, whether nothing tells it the flow's scale, and the force that it feels. starts: false where it
+    does not.
     """
 
     starts: bool
@@ -191,6 +205,7 @@ class FirstState(NamedTuple):
     position_variance: float
     heading_variance: float
     untold_scale: bool
+    steady: SteadyForce
 
 
 @procedure
@@ -206,7 +221,7 @@ def begin(work: Work, lanes: Lanes, lane: int, first: FirstState, p: Work) -> No
     store_biases(work, lanes, lane, Biases(0.0, 0.0, 0.0, level.bias_x, level.bias_y, 0.0))
     store_rate(work, lanes, lane, Rate(0.0, 0.0, 0.0))
     store_force(work, lanes, lane, Force(0.0, 0.0, 0.0))
-    store_steady(work, lanes, lane, SteadyForce(0.0, 0.0, -GRAVITY_M_S2))
+    store_steady(work, lanes, lane, first.steady)
     for i in range(3):
         set_variance(work, lanes, POSITION + i, lane, first.position_variance)
         set_variance(work, lanes, ATTITUDE + i, lane, first.heading_variance if i == 2 else level.tilt_variance)
@@ -286,17 +301,19 @@ def start_lanes(
     levels = levelling(m, bias_sigma, read, unknown)
     w, x, y, z = (m.qw, m.qx, m.qy, m.qz) if read else level(m, levels.believed, heading.field_rad, fitted)
     turned = heading_sigma(read, lost, unknown, heading.field_rad, fitted.heading)
+    attitude = Attitude(w, x, y, z)
     spread = LOST_SIGMA_M if lost else ORIGIN_SIGMA_M
     fix = PositionNed(reading.value_0, reading.value_1, reading.value_2)
     return Beginning(
         FirstState(
             begins,
             fix if at_fix else PositionNed(0.0, 0.0, 0.0),
-            Attitude(w, x, y, z),
+            attitude,
             levels,
             spread * spread,
             turned * turned,
             not lost,
+            SteadyForce(*to_earth(rotation_by(attitude), m.felt_x, m.felt_y, m.felt_z)),
         ),
         with_started(m, started=1.0 if begins else m.started),
         with_aid(aid, aided_s=t_s if begins else aid.aided_s, flag=0.0 if begins else aid.flag),

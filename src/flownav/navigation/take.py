@@ -23,6 +23,7 @@ from flownav.navigation.flow import take_flow
 from flownav.navigation.gps import take_gps
 from flownav.navigation.heading import take_mag, take_yaw
 from flownav.navigation.height import take_range
+from flownav.navigation.ground import walk_ground
 from flownav.navigation.inertial import judge_motion, keep_imu, steady_force
 from flownav.navigation.journal import note_decay, note_estimate, note_prediction, reset_state
 from flownav.navigation.lagged_flow import flow_lag
@@ -41,7 +42,9 @@ from flownav.navigation.packed import (
     load_equipment,
     load_filter_settings,
     load_flow_settings,
+    load_height_settings,
     load_imu_settings,
+    load_place_settings,
 )
 from flownav.navigation.place import take_landed, take_pad, take_pose
 from flownav.navigation.protection import mind_faults, set_levels
@@ -192,6 +195,7 @@ def advance(work: Work, lanes: Lanes, lag: bool | None, t_s: float, p: Work, o: 
         steady_force(work, lanes, dt_s)
         note_push(work, lanes, dt_s)
         propagate_walks(work, lanes, dt_s, settings)
+        walk_ground(work, lanes, dt_s, load_height_settings(p), load_place_settings(p))
         add_vibration_noise(work, lanes, dt_s, imu)
         if len(lanes) == 1:
             note_prediction(work, lanes, dt_s, o)

@@ -107,6 +107,8 @@ class HeightSettings(NamedTuple):
     range_below_m: float
     range_sigma_m: float
     range_relative_sigma: float
+    range_scale_sigma: float
+    ground_walk_m_rt_s: float
     range_min_m: float
     range_max_m: float
     range_stuck_s: float
@@ -133,6 +135,9 @@ class PlaceSettings(NamedTuple):
 
     pad_angle_sigma_rad: float
     pad_distance_sigma: float
+    pad_boresight_sigma_rad: float
+    pad_scale_sigma: float
+    pad_time_sigma_s: float
     pose_sigma_m: float
     still_sigma_m_s: float
     pad_forward_m: float

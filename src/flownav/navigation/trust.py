@@ -25,6 +25,7 @@ FOLLOWING_BLOCKS = 10.0
 BLOCKS_BEFORE = 3.0  # what a block is held against, exponentially
 LIKENESS_ALLOWED = 0.15
 FACTOR_PACE = 0.25  # by how much the factor grows or shrinks in a block, per likeness beyond what is allowed
+LEAST_FACTOR = 0.7
 LARGEST_FACTOR = 30.0  # 1 carries that position half a kilometre off
 NOISE_TIME_S = 20.0  # chosen: a noise is found within 15 % (test_trust)
 SMALLEST_NOISE, LARGEST_NOISE = 0.02, 25.0  # of the variance that is said: chosen; the first is held by test_trust
@@ -60,7 +61,7 @@ def followed_factor(t_s: float, m: WhitenessMemory) -> WhitenessMemory:
     """A new block, and the factor by how alike those before it are."""
     likeness, after = block_ended(t_s, m)
     factor = m.factor * exp(FACTOR_PACE * (likeness - LIKENESS_ALLOWED))
-    return with_factor(after, factor=clamp(factor, 1.0, LARGEST_FACTOR))
+    return with_factor(after, factor=clamp(factor, LEAST_FACTOR, LARGEST_FACTOR))
 
 
 @on_lanes
@@ -88,7 +89,8 @@ class AccelFactors(NamedTuple):
 def accel_factors(work: Work, lanes: Lanes, lane: int) -> AccelFactors:
     """How far a lane's accelerometer is trusted."""
     forward, right = load_whiteness(work, lanes, 0, lane), load_whiteness(work, lanes, 1, lane)
-    return AccelFactors(larger(forward.factor, right.factor), load_whiteness(work, lanes, 2, lane).factor)
+    down = load_whiteness(work, lanes, 2, lane)
+    return AccelFactors(larger(larger(forward.factor, right.factor), 1.0), larger(down.factor, 1.0))
 
 
 MEMORY.derive(AccelFactors, accel_factors)

@@ -28,7 +28,6 @@ from flownav.estimation.states import (
     NOISE,
     PAD,
     STATES,
-    VELOCITY,
 )
 
 EXAMPLES = settings(max_examples=8, deadline=None)
@@ -49,17 +48,13 @@ def stationary(numbers: FilterSettings) -> tuple[np.ndarray, np.ndarray]:
     return sigma, tau_s
 
 
-def walks(numbers: FilterSettings, speed_m_s: float = np.inf) -> np.ndarray:
-    """Of every state, what it walks in the square root of a second; position and motion are no part of this.
-
-    The ground walks as stated below a vehicle that goes 1 m/s or faster, and less below a slower one.
-    """
+def walks(numbers: FilterSettings) -> np.ndarray:
+    """Of every state, what it walks in the square root of a second; position, motion and ground are no part of this."""
     found = np.zeros(N)
     for first, count, walk in (
         (GYRO_BIAS, 3, numbers.gyro_walk_rad_s_rt_s),
         (ACCEL_BIAS, 3, numbers.accel_walk_m_s2_rt_s),
         (PAD, 3, numbers.pad_walk_m_rt_s),
-        (GROUND, 1, numbers.ground_walk_m_rt_s * np.sqrt(min(speed_m_s, 1.0))),
         (BARO, 1, numbers.baro_walk_m_rt_s),
     ):
         found[first : first + count] = walk
@@ -75,7 +70,7 @@ def test_the_errors_of_one_step_are_a_diagonal_transition_and_a_diagonal_noise(s
     markov = tau_s > 0.0
     factor = np.ones(N)
     factor[markov] = np.exp(-dt_s / tau_s[markov])
-    noise = walks(SETTINGS, np.hypot(*filter_.x[VELOCITY : VELOCITY + 2])) ** 2 * dt_s + sigma**2 * (1.0 - factor**2)
+    noise = walks(SETTINGS) ** 2 * dt_s + sigma**2 * (1.0 - factor**2)
     x, p = factor * filter_.x, np.outer(factor, factor) * filter_.p + np.diag(noise)
     propagate_walks(filter_.work, ONE_LANE, dt_s, SETTINGS)
     propagate_gauss_markov(filter_.work, ONE_LANE, N, dt_s, SETTINGS)
@@ -123,13 +118,3 @@ def test_a_pad_that_does_not_move_gains_nothing():
     propagate_walks(filter_.work, ONE_LANE, 10.0, SETTINGS._replace(pad_walk_m_rt_s=0.0))
     assert np.all(np.diag(filter_.p)[PAD : PAD + 3] == 0.0)
     assert filter_.p[GROUND, GROUND] == 0.0
-
-
-@pytest.mark.parametrize(
-    ("north_m_s", "east_m_s", "share"), [(0.0, 0.0, 0.0), (0.3, -0.4, 0.5), (-0.6, 0.8, 1.0), (9.0, 0.0, 1.0)]
-)
-def test_the_ground_walks_as_much_as_passes_below(north_m_s, east_m_s, share):
-    filter_ = Filter()
-    filter_.x[VELOCITY : VELOCITY + 2] = north_m_s, east_m_s
-    propagate_walks(filter_.work, ONE_LANE, 2.0, SETTINGS)
-    assert filter_.p[GROUND, GROUND] == pytest.approx(2.0 * share * SETTINGS.ground_walk_m_rt_s**2)

@@ -61,7 +61,7 @@ SETTINGS = FilterSettings(
     gps_fast_sigma_m=0.4, gps_fast_sigma_down_m=0.7, gps_fast_tau_s=8.0,
     gps_velocity_sigma_m_s=0.1, gps_velocity_sigma_down_m_s=0.16, gps_velocity_tau_s=3.0,
     ins_tilt_sigma_rad=0.01, ins_tilt_tau_s=60.0, ins_heading_sigma_rad=0.03, ins_heading_tau_s=120.0,
-    ground_walk_m_rt_s=0.02, baro_walk_m_rt_s=0.05, pad_walk_m_rt_s=0.007, flow_scale_sigma=0.02,
+    baro_walk_m_rt_s=0.05, pad_walk_m_rt_s=0.007, flow_scale_sigma=0.02,
     gate_sigma=5.0, accel_bias_limit_m_s2=1.0, gyro_bias_limit_rad_s=0.1,
 )  # fmt: skip
 SILENT = SETTINGS._replace(
@@ -69,7 +69,7 @@ SILENT = SETTINGS._replace(
     position_walk_m_rt_s=0.0, gps_slow_sigma_m=0.0, gps_slow_sigma_down_m=0.0, gps_fast_sigma_m=0.0,
     gps_fast_sigma_down_m=0.0, gps_velocity_sigma_m_s=0.0, gps_velocity_sigma_down_m_s=0.0,
     ins_tilt_sigma_rad=0.0, ins_heading_sigma_rad=0.0,
-    ground_walk_m_rt_s=0.0, baro_walk_m_rt_s=0.0, pad_walk_m_rt_s=0.0,
+    baro_walk_m_rt_s=0.0, pad_walk_m_rt_s=0.0,
 )  # fmt: skip
 
 

@@ -7,13 +7,13 @@ import math
 import pytest
 
 from flownav.core.measurement import Sensor
-from flownav.estimation.named import Attitude, PositionNed
+from flownav.estimation.named import Attitude, PositionNed, VelocityNed
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GPS_FAST, GPS_SLOW, GPS_VELOCITY, PAD, POSITION, VELOCITY
 from flownav.navigation import verdicts
 from flownav.navigation.compass import check_compass
 from flownav.navigation.course import FOUND_RAD, LEAST_TRAVEL_M, find_heading
 from flownav.navigation.gps import UNKNOWN_PAD_M, AlongAxis, judge_fate
-from flownav.navigation.motion_records import CourseMemory, PushMemory
+from flownav.navigation.motion_records import CourseMemory, ImuMemory, PushMemory
 from flownav.navigation.offers import compare_level, note_aid, note_aid_age, note_height
 from flownav.navigation.place import (
     LEFT,
@@ -178,7 +178,9 @@ def test_a_pad_that_a_camera_sees_first_is_found_where_it_is():
 
 
 def test_the_law_of_a_pad_fix_reads_all_of_it():
-    judged = judge_sight.law(reading(0.1, -0.2, 4.0), RUNS, component=1, s=TOLD.place)
+    judged = judge_sight.law(
+        reading(0.1, -0.2, 4.0), RUNS, VelocityNed(0.0, 0.0, 0.0), ImuMemory(), component=1, s=TOLD.place
+    )
     assert (judged.offer.measured, judged.offer.reason, judged.sight) == (-0.2, FUSED, (0.1, -0.2, 4.0))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flownav.core.frames import GRAVITY_M_S2
-from flownav.estimation.named import PositionNed
+from flownav.estimation.named import PositionNed, VelocityNed
 from flownav.estimation.states import BARO
 from flownav.navigation.attitude import read_attitude
 from flownav.navigation.baro import judge_baro
@@ -20,7 +20,7 @@ from flownav.navigation.heading import heading_variance, magnetic_heading
 from flownav.navigation.height import creeps, range_variance, range_verdict, repeats
 from flownav.navigation.inertial import motion_between, said_by, sound
 from flownav.navigation.motion_records import ImuMemory, SteadyForce
-from flownav.navigation.place import judge_pad, judge_pose
+from flownav.navigation.place import judge_pad, judge_pose, late_variance
 from flownav.navigation.reasons import (
     BEFORE_START,
     FUSED,
@@ -403,6 +403,24 @@ def test_noise_of_a_pad_fix_grows_with_its_distance():
 def test_what_a_pad_fix_states_of_its_distance_is_taken_as_it_is():
     fix = reading(0.0, 0.0, 2.0, variance=(1e-4, 1e-4, 0.01))
     assert judge_pad(fix, 2, 1.0, TOLD.place) == (FUSED, 0.01)
+
+
+def test_what_lasts_of_a_pad_fix_is_no_noise_of_it_and_some_noise_is_always_left():
+    """Of 10 mrad stated at 2 m, 8 last; of a fix that states less than lasts, a fiftieth is noise."""
+    s = TOLD.place._replace(pad_boresight_sigma_rad=0.008, pad_scale_sigma=0.02)
+    fix = reading(0.0, 0.0, 2.0, variance=(1e-4, 1e-6, 0.01))
+    judged = [judge_pad(fix, component, 1.0, s)[1] for component in range(3)]
+    assert judged == pytest.approx([4.0 * (1e-4 - 0.008**2), 0.02 * 4e-6, 0.01 - 0.04**2])
+
+
+def test_a_fix_that_is_stamped_wrongly_errs_by_how_far_the_pad_passes_by_meanwhile():
+    """10 ms, at 3 m/s and 4 m away at 0.5 rad/s: 30 and 20 mm; along the sight, turning moves nothing."""
+    s, m = TOLD.place._replace(pad_time_sigma_s=0.01), imu_memory(gyro_x=0.3, gyro_y=-0.4, gyro_z=9.0)
+    moving = VelocityNed(2.0, -1.0, 2.0)
+    assert late_variance(moving, m, 4.0, 0, s) == pytest.approx(0.03**2 + 0.02**2)
+    assert late_variance(moving, m, 4.0, 1, s) == pytest.approx(0.03**2 + 0.02**2)
+    assert late_variance(moving, m, 4.0, 2, s) == pytest.approx(0.03**2)
+    assert late_variance(moving, m, 4.0, 0, TOLD.place) == 0.0
 
 
 def test_components():

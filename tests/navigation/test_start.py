@@ -20,6 +20,7 @@ from flownav.navigation.start import (
     LEVELLING_S,
     RECTIFIED_SHARE,
     STANDING_TILT_RAD,
+    felt,
     level,
     levelled,
     levelling,
@@ -72,6 +73,18 @@ def test_the_mean_force_is_that_of_all_readings_whatever_sways():
 
 def test_what_is_not_shaken_is_not_said_to_be():
     assert on_a_slope().shaken == pytest.approx(0.0, abs=1e-24)
+
+
+def test_what_is_felt_at_the_start_is_the_force_of_the_last_tenth_of_a_second_without_its_vibration():
+    """At 200 Hz a second of rest and then 0.3 s of 2 m/s2, shaken by 3 m/s2 at 50 Hz; the mean has less of it."""
+    m = StartMemory()
+    for k in range(260):
+        pushed = 2.0 * (k >= 200) + 3.0 * math.sin(0.5 * math.pi * k)
+        reading = Reading(0.0, 0.0, 0.0, pushed, 0.0, -GRAVITY_M_S2, arrived=1.0)
+        m = levelled(reading, felt(reading, m, 0.005), 0.005 * k)
+    assert m.felt_x == pytest.approx(2.0 * (1.0 - math.exp(-3.0)), abs=0.15)
+    assert (m.felt_y, m.felt_z) == (0.0, pytest.approx(-GRAVITY_M_S2))
+    assert m.force_x < 1.0
 
 
 def test_how_a_vehicle_is_shaken_is_the_mean_square_of_an_axis():

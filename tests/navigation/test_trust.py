@@ -19,6 +19,7 @@ from flownav.navigation.trust import (
     FACTOR_PACE,
     LARGEST_FACTOR,
     LARGEST_NOISE,
+    LEAST_FACTOR,
     LIKENESS_ALLOWED,
     OF_BARO,
     OF_RANGE,
@@ -104,7 +105,7 @@ def test_innovations_that_are_alike_raise_the_accelerometers_noise_whatever_thei
     for size in (1.0, 4.0):
         grown = factors(np.full(400, size))
         assert grown[-1] > 3.0
-        assert np.all(np.diff(grown) >= 0.0)
+        assert np.all(np.diff(grown[grown > 1.0]) >= 0.0)
     assert factors(np.full(4000, 1.0)).max() == LARGEST_FACTOR
     assert factors(np.full(20, 1.0))[-1] < 10.0  # and not at once
 
@@ -116,11 +117,12 @@ def test_white_innovations_do_not_raise_it_however_large():
         assert factors(white, start=20.0)[-1] < 2.0  # and lower what was raised
 
 
-def test_it_falls_by_what_is_allowed_where_nothing_is_alike_and_never_below_one():
+def test_it_falls_by_what_is_allowed_where_nothing_is_alike_and_as_far_as_lets_it_grow_again_soon():
     assert factors([1.0, 0.0, 0.0, 0.0, 0.0], start=10.0)[-1] == pytest.approx(
         10.0 * math.exp(-FACTOR_PACE * LIKENESS_ALLOWED * 2.0)
     )
-    assert factors(np.zeros(4000), start=10.0)[-1] == 1.0
+    assert factors(np.zeros(4000), start=10.0)[-1] == LEAST_FACTOR
+    assert factors(np.full(20, 1.0), start=LEAST_FACTOR)[-1] > 1.0
 
 
 @pytest.mark.parametrize(("reason", "counts"), [(FUSED, 1), (INNOVATION_GATE, 1), (OUT_OF_RANGE, 0), (SILENT, 0)])

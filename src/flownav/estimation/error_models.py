@@ -11,24 +11,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.core.compile import Lanes, Work, equation, exp, procedure, smaller, squared
+from flownav.core.compile import Lanes, Work, equation, exp, procedure, squared
 from flownav.core.measurement import Array
-from flownav.estimation.covariance import add_noise, add_noise_lane, decay
+from flownav.estimation.covariance import add_noise, decay
 from flownav.estimation.states import (
     ACCEL_BIAS,
     BARO,
     GPS_FAST,
     GPS_SLOW,
     GPS_VELOCITY,
-    GROUND,
     GYRO_BIAS,
     INS_ERROR,
     PAD,
-    STATE,
-    VELOCITY,
 )
-
-OVER_GROUND_M_S = 1.0  # from this speed on the ground walks as stated: chosen, a walking pace
 
 
 class FilterSettings(NamedTuple):
@@ -54,7 +49,6 @@ class FilterSettings(NamedTuple):
     ins_tilt_tau_s: float
     ins_heading_sigma_rad: float
     ins_heading_tau_s: float
-    ground_walk_m_rt_s: float
     baro_walk_m_rt_s: float
     pad_walk_m_rt_s: float
     flow_scale_sigma: float
@@ -70,18 +64,7 @@ def propagate_walks(work: Work, lanes: Lanes, dt_s: float, settings: FilterSetti
         add_noise(work, lanes, GYRO_BIAS + axis, squared(settings.gyro_walk_rad_s_rt_s) * dt_s)
         add_noise(work, lanes, ACCEL_BIAS + axis, squared(settings.accel_walk_m_s2_rt_s) * dt_s)
         add_noise(work, lanes, PAD + axis, squared(settings.pad_walk_m_rt_s) * dt_s)
-    for lane in range(len(lanes)):
-        over = over_ground(
-            work[(STATE + VELOCITY) * len(lanes) + lane], work[(STATE + VELOCITY + 1) * len(lanes) + lane]
-        )
-        add_noise_lane(work, lanes, GROUND, lane, 0.0 * over * squared(settings.ground_walk_m_rt_s) * dt_s)
     add_noise(work, lanes, BARO, squared(settings.baro_walk_m_rt_s) * dt_s)
-
-
-@equation
-def over_ground(north_m_s: float, east_m_s: float) -> float:
-    """How much ground passes below, as a share of what passes at OVER_GROUND_M_S: a hover is over one place."""
-    return smaller(np.sqrt(squared(north_m_s) + squared(east_m_s)) / OVER_GROUND_M_S, 1.0)
 
 
 @procedure

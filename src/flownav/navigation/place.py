@@ -12,8 +12,8 @@ from flownav.estimation.laws.still import pad_below, position_itself, velocity_i
 from flownav.estimation.named import Attitude, PositionNed, VelocityNed, rotation_by
 from flownav.estimation.states import MEASURED, PAD, STATE
 from flownav.navigation.memory import MEMORY
-from flownav.navigation.offers import compare_level, conclude, fuse_offered, judged_whole, note_aid, note_height
 from flownav.navigation.motion_records import ImuMemory
+from flownav.navigation.offers import compare_level, conclude, fuse_offered, judged_whole, note_aid, note_height
 from flownav.navigation.packed import load_place_settings
 from flownav.navigation.reasons import (
     FUSED,

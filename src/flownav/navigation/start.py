@@ -137,7 +137,10 @@ class Levelled(NamedTuple):
 def note_force(reading: Reading, m: StartMemory, imu: ImuMemory, *, t_s: float) -> Levelled:
     """The latest inertial reading before the start, and the mean specific force."""
     noted = m.started == 0.0 and reading.arrived > 0.0 and is_possible(reading)
-    return Levelled(levelled(reading, felt(reading, m, t_s - imu.read_s), t_s) if noted else m, with_reading(reading, t_s, imu) if noted else imu)
+    return Levelled(
+        levelled(reading, felt(reading, m, t_s - imu.read_s), t_s) if noted else m,
+        with_reading(reading, t_s, imu) if noted else imu,
+    )
 
 
 @procedure

@@ -21,9 +21,9 @@ from flownav.navigation.compass import check_compass, note_push
 from flownav.navigation.course import find_heading, note_flow_course, seeks
 from flownav.navigation.flow import take_flow
 from flownav.navigation.gps import take_gps
+from flownav.navigation.ground import walk_below
 from flownav.navigation.heading import take_mag, take_yaw
 from flownav.navigation.height import take_range
-from flownav.navigation.ground import walk_ground
 from flownav.navigation.inertial import judge_motion, keep_imu, steady_force
 from flownav.navigation.journal import note_decay, note_estimate, note_prediction, reset_state
 from flownav.navigation.lagged_flow import flow_lag
@@ -195,7 +195,7 @@ def advance(work: Work, lanes: Lanes, lag: bool | None, t_s: float, p: Work, o: 
         steady_force(work, lanes, dt_s)
         note_push(work, lanes, dt_s)
         propagate_walks(work, lanes, dt_s, settings)
-        walk_ground(work, lanes, dt_s, load_height_settings(p), load_place_settings(p))
+        walk_below(work, lanes, dt_s, load_height_settings(p), load_place_settings(p))
         add_vibration_noise(work, lanes, dt_s, imu)
         if len(lanes) == 1:
             note_prediction(work, lanes, dt_s, o)

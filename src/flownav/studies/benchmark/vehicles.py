@@ -180,7 +180,7 @@ SETTINGS = FilterSettings(
     gps_fast_sigma_m=0.5, gps_fast_sigma_down_m=1.0, gps_fast_tau_s=20.0,
     gps_velocity_sigma_m_s=0.1, gps_velocity_sigma_down_m_s=0.1, gps_velocity_tau_s=5.0,
     ins_tilt_sigma_rad=0.01, ins_tilt_tau_s=30.0, ins_heading_sigma_rad=0.15, ins_heading_tau_s=3e4,
-    ground_walk_m_rt_s=0.05, baro_walk_m_rt_s=0.1, pad_walk_m_rt_s=0.0, flow_scale_sigma=0.03,
+    baro_walk_m_rt_s=0.1, pad_walk_m_rt_s=0.0, flow_scale_sigma=0.03,
     gate_sigma=5.0, accel_bias_limit_m_s2=0.6, gyro_bias_limit_rad_s=0.15,
 )  # fmt: skip
 

@@ -30,8 +30,8 @@ NOTCHED = ("level_m_s2", "vertical_m_s2")
 # what a unit that integrates leaves out of the position; with 0.01, the default, w errs by 0.7 of what is stated at
 # `approach`, with this by 1.0
 INTEGRATED_M_RT_S = 0.002
-# of a rangefinder's error of scale, what counts as noise; it lasts, and over one ground it is the ground's height. With
-# all of it w errs by 0.5 of what is stated in a hover (`takeoff`), with none z by more than is stated (`landing`)
+# of a rangefinder's error of scale, what the ground walks by as the height changes: a walk doubts the vertical velocity
+# by more than a share that lasts does. With all of it z errs by 0.80 of what is stated (`takeoff`), with half by 0.87
 SCALE_SHARE = 0.5
 FOLLOWED_TO = 0.002  # a notch follows its tone within this (test_notch), whatever the rotor does
 LAGS_AS_STATED = 2.0  # of a receiver's filter: 0.2 to 0.3 s were found in two logs where sheets say 0.1 s (validate)

@@ -13,6 +13,7 @@ from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler, rotation_fr
 from flownav.core.measurement import Sensor
 from flownav.estimation.motion import predict
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, IMU, VELOCITY
+from flownav.navigation.before_start import felt, levelled
 from flownav.navigation.records import Reading, StartMemory
 from flownav.navigation.start import (
     HOVERING_M_S2,
@@ -20,9 +21,7 @@ from flownav.navigation.start import (
     LEVELLING_S,
     RECTIFIED_SHARE,
     STANDING_TILT_RAD,
-    felt,
     level,
-    levelled,
     levelling,
     noise_of_mean,
     starts,

@@ -53,4 +53,4 @@ def test_velocity_errs_by_what_is_stated_of_it_in_a_tail_wind_too():
     setup = in_wind(load_scenario("approach"), 8.0, 180.0)
     ratios = over_stated(fly_judged(setup.flight, 1, 4 * FLIGHTS).sums)
     assert max(ratios[name] for name in ("u", "v")) < 1.1
-    assert ratios["w"] < 1.3
+    assert ratios["w"] < 1.35

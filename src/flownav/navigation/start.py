@@ -12,11 +12,11 @@ from flownav.estimation.hypotheses import COUNT, begin_lane_anew
 from flownav.estimation.laws import component
 from flownav.estimation.named import Attitude, PositionNed, rotation_by
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, POSITION, RATE, VELOCITY
+from flownav.navigation.before_start import waits
 from flownav.navigation.course import with_sought
-from flownav.navigation.inertial import STEADY_S, is_possible
 from flownav.navigation.lagged_flow import start_lag
 from flownav.navigation.memory import MEMORY
-from flownav.navigation.motion_records import ImuMemory, SteadyForce
+from flownav.navigation.motion_records import SteadyForce
 from flownav.navigation.offers import with_aid
 from flownav.navigation.packed import START_SIGMA, load_filter_settings, load_flow_settings
 from flownav.navigation.place import ON_GROUND
@@ -25,7 +25,6 @@ from flownav.navigation.records import AidMemory, HeadingMemory, Reading, ScaleD
 from flownav.navigation.tape import START, Output
 from flownav.navigation.told import FROM_MAG, FROM_YAW, NO_HEADING, Equipment
 from flownav.navigation.verdicts import Biases, Event, Force, on_lanes
-from flownav.navigation.vibration import with_reading
 
 # All chosen for any small vehicle, none fitted to a log; what no test is named beside is not measured.
 ORIGIN_SIGMA_M = 0.1  # the local origin, where the navigator's start defines it
@@ -38,15 +37,12 @@ UNKNOWN_RAD = 1.5  # one that is to be found from the course: any of half a turn
 COMPASS_HEADING_RAD = 0.3  # a raw magnetometer's: twice the usual hard iron (compass_sigma_rad)
 DATUM_HEADING_RAD = 1e-3  # the start defines the frame
 UNTOLD_HEADING_RAD = 1.0  # the first heading that is told will, 0.5 rad off (test_an_external_heading_is_taken)
-LEAST_LEVELLING, MOST_LEVELLING = 5.0, 100.0  # readings whose mean is level: 0.1 to 2 s at 50 Hz
+LEAST_LEVELLING = 5.0  # readings whose mean is level: 0.1 s at 50 Hz
 # so sure a mean will do (0.6 deg); a shaken vehicle's is waited for
 LEVELLED_M_S2, LEVELLING_S = 0.1, 1.0
 HOVERING_M_S2 = 0.15  # how it may accelerate over that second: chosen; with 0.1 laps from the start err 2.6 sigma
 RECTIFIED_SHARE = 0.1  # of what shakes an accelerometer lasts in its mean: chosen; 1 is the false roll of `landing`
 
-with_force = replacing(StartMemory, "force_x", "force_y", "force_z", "readings", "shaken", "since_s")
-with_felt = replacing(StartMemory, "felt_x", "felt_y", "felt_z")
-with_attitude = replacing(StartMemory, "attitude_s", "qw", "qx", "qy", "qz")
 with_started = replacing(StartMemory, "started")
 
 
@@ -70,87 +66,15 @@ _, store_doubt = MEMORY.access(ScaleDoubt)
 
 # -- before the start -----------------------------------------------------------------------------------------
 @equation
-def levelled(reading: Reading, m: StartMemory, t_s: float) -> StartMemory:
-    """The mean specific force [m/s2], and how it is shaken, with one reading more."""
-    share = 1.0 / min(m.readings + 1.0, MOST_LEVELLING)
-    x, y, z = reading.value_3 - m.force_x, reading.value_4 - m.force_y, reading.value_5 - m.force_z
-    square = (x * x + y * y + z * z) / 3.0 if m.readings > 0.0 else 0.0
-    return with_force(
-        m,
-        force_x=m.force_x + share * x,
-        force_y=m.force_y + share * y,
-        force_z=m.force_z + share * z,
-        readings=m.readings + 1.0,
-        shaken=m.shaken + share * (square - m.shaken),
-        since_s=m.since_s if m.readings > 0.0 else t_s,
-    )
-
-
-@equation
-def felt(reading: Reading, m: StartMemory, dt_s: float) -> StartMemory:
-    """The specific force as it is now, without its vibration; the first as it is read."""
-    share = dt_s / (STEADY_S + dt_s) if m.readings > 0.0 else 1.0
-    return with_felt(
-        m,
-        felt_x=m.felt_x + share * (reading.value_3 - m.felt_x),
-        felt_y=m.felt_y + share * (reading.value_4 - m.felt_y),
-        felt_z=m.felt_z + share * (reading.value_5 - m.felt_z),
-    )
-
-
-@equation
 def noise_of_mean(m: StartMemory) -> float:
     """The variance of the mean specific force about gravity's, of readings shaken each by itself [m2/s4]."""
     return squared(HOVERING_M_S2) + m.shaken / larger(m.readings, 1.0)
 
 
 @on_lanes
-def waits(m: StartMemory) -> bool:
-    """Whether any lane has not started."""
-    return m.started == 0.0
-
-
-@on_lanes
 def runs(m: StartMemory) -> bool:
     """Whether any lane has started."""
     return m.started > 0.0
-
-
-@on_lanes
-def note_attitude(reading: Reading, m: StartMemory, *, t_s: float) -> StartMemory:
-    """The latest attitude before the start, of unit length."""
-    w, x, y, z = reading.value_0, reading.value_1, reading.value_2, reading.value_3
-    size = np.sqrt(squared(w) + squared(x) + squared(y) + squared(z))
-    noted = m.started == 0.0 and reading.arrived > 0.0 and size > 0.5 and size < 2.0
-    after = with_attitude(m, attitude_s=t_s, qw=w / size, qx=x / size, qy=y / size, qz=z / size)
-    return after if noted else m
-
-
-class Levelled(NamedTuple):
-    """What an inertial reading before the start leaves."""
-
-    start: StartMemory
-    imu: ImuMemory
-
-
-@on_lanes
-def note_force(reading: Reading, m: StartMemory, imu: ImuMemory, *, t_s: float) -> Levelled:
-    """The latest inertial reading before the start, and the mean specific force."""
-    noted = m.started == 0.0 and reading.arrived > 0.0 and is_possible(reading)
-    return Levelled(
-        levelled(reading, felt(reading, m, t_s - imu.read_s), t_s) if noted else m,
-        with_reading(reading, t_s, imu) if noted else imu,
-    )
-
-
-@procedure
-def gather(work: Work, lanes: Lanes, t_s: float, sensor: int) -> None:
-    """Before the start: the latest attitude, IMU reading, and the mean specific force."""
-    if waits(work, lanes):
-        if sensor == Sensor.ATTITUDE:
-            note_attitude(work, lanes, t_s)
-        elif sensor == Sensor.IMU:
-            note_force(work, lanes, t_s)
 
 
 # -- the start ------------------------------------------------------------------------------------------------

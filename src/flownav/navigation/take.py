@@ -17,6 +17,7 @@ from flownav.estimation.motion import hold_still, predict
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, STATES, VELOCITY
 from flownav.navigation.attitude import take_attitude
 from flownav.navigation.baro import take_baro
+from flownav.navigation.before_start import gather
 from flownav.navigation.compass import check_compass, note_push
 from flownav.navigation.course import find_heading, note_flow_course, seeks
 from flownav.navigation.flow import take_flow
@@ -49,7 +50,7 @@ from flownav.navigation.packed import (
 from flownav.navigation.place import take_landed, take_pad, take_pose
 from flownav.navigation.protection import mind_faults, set_levels
 from flownav.navigation.spikes import drop_spikes
-from flownav.navigation.start import gather, runs, try_start
+from flownav.navigation.start import runs, try_start
 from flownav.navigation.still import stand_still, watch_gps_velocity, watch_imu, watch_range
 from flownav.navigation.tape import ESTIMATE_PERIOD_S, Output, output_of, write_estimate
 from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment

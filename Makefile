@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 unexport PYTHONDONTWRITEBYTECODE  # the tests start Python hundreds of times: what it made of NumPy and Numba is kept
 INSTALL := $(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test test-real-time test-random test-gpu test-slow long-log fuzz mutants league integrity rare validate weigh digests pairs report-size schemas lint bench bench-once docs pictures tutorials wheel wheel-test clean
+.PHONY: demo test test-real-time test-random test-gpu test-slow long-log fuzz mutants league made-flights explain integrity witnesses rare validate weigh onboard digests pairs report-size install-size schemas lint bench bench-once docs pictures tutorials wheel wheel-test clean
 
 demo: $(VENV)/.ready
 	$(BIN)/flownav fly --out out/sortie.fnr --force
@@ -29,25 +29,41 @@ long-log: $(VENV)/.ready-test
 	$(BIN)/python -m pytest -s -m slow tests/replays/test_long_log.py
 
 fuzz: $(VENV)/.ready-test
-	FLOWNAV_FUZZ=$${FLOWNAV_FUZZ:-20000} $(BIN)/python -m pytest -m fuzz tests/logs tests/live/test_fuzz_live.py tests/core/test_fuzz_parameters.py
+	FLOWNAV_FUZZ=$${FLOWNAV_FUZZ:-20000} $(BIN)/python -m pytest -m fuzz tests/logs tests/live/test_fuzz_live.py tests/core/test_fuzz_parameters.py tests/campaigns/test_fuzz_files.py
 
 mutants: $(VENV)/.ready-test
 	$(BIN)/python tests/helpers/mutants.py $(if $(EVERY),--every $(EVERY)) $(PART)
 
 league: $(VENV)/.ready
 	$(BIN)/python tools/league.py $${FLOWNAV_DATA:-../shared/data} docs/explanation/league.md
+	$(MAKE) made-flights
+
+made-flights: $(VENV)/.ready
+	$(BIN)/python tools/made_flights.py judge --signs --page docs/explanation/made-flights.md
+	$(BIN)/python tools/made_flights.py compare $${FLOWNAV_DATA:-../shared/data} --seeds 5 --page docs/explanation/made-flights.md
+
+explain: $(VENV)/.ready
+	$(BIN)/python tools/explain.py docs/explanation/explained.md --data $${FLOWNAV_DATA:-../shared/data} $(if $(CALIBRATE),--calibrate)
 
 integrity: $(VENV)/.ready
 	$(BIN)/python tools/integrity.py docs/explanation/integrity.md
+
+witnesses: $(VENV)/.ready
+	$(BIN)/python tools/witnesses.py docs/explanation/faults.md $(if $(SEEDS),--seeds $(SEEDS))
 
 rare: $(VENV)/.ready
 	$(BIN)/python tools/rare_table.py $(FLIGHTS)
 
 validate: $(VENV)/.ready
-	FLOWNAV_DATA=$${FLOWNAV_DATA:-../shared/data} $(BIN)/flownav validate --out docs/explanation/validation.md --force
+	rm -f out/validation.md
+	FLOWNAV_DATA=$${FLOWNAV_DATA:-../shared/data} $(BIN)/flownav validate --out out/validation.md
+	mv out/validation.md docs/explanation/validation.md
 
 weigh: $(VENV)/.ready
 	$(BIN)/python tools/weigh.py
+
+onboard: $(VENV)/.ready-onboard
+	$(BIN)/python tools/onboard.py docs/explanation/onboard.md
 
 digests: $(VENV)/.ready
 	$(BIN)/python tools/digests.py $(DIGESTS)
@@ -57,6 +73,11 @@ pairs: $(VENV)/.ready
 
 report-size: $(VENV)/.ready-test
 	$(BIN)/python tools/report_size.py $(RECORDS)
+
+install-size:
+	rm -rf out/installed && $(PYTHON) -m venv out/installed
+	out/installed/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt .
+	out/installed/bin/python tools/install_size.py out/installed/lib/python3*/site-packages
 
 schemas: $(VENV)/.ready
 	$(BIN)/python tools/schemas.py
@@ -100,7 +121,7 @@ $(VENV)/.python:
 
 $(VENV)/.ready: $(VENV)/.python pyproject.toml constraints.txt
 	@echo "flownav: installing libraries into $(VENV), once, about half a minute"
-	$(INSTALL:--quiet=--progress-bar off) --editable .
+	$(INSTALL:--quiet=--progress-bar off) --editable '.[plots,pictures]'
 	@touch $@
 
 $(VENV)/.ready-%: $(VENV)/.ready

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import gc
 import os
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 # NumPy, which reads this as it is imported, multiplies on as many threads as there are cores: where the workers keep
 # the cores busy, those threads only wait for each other, and processor time is spent on that
@@ -17,6 +19,7 @@ import pytest
 import command_tree
 import compile_once
 import rewrite_once
+from browsing import CHROMIUM, QUIET
 from places import SHARED
 
 # a loaded machine draws slowly, and says nothing of the test by that
@@ -60,3 +63,15 @@ def data_folder() -> Path:
 @pytest.fixture(scope="session")
 def paper_folder() -> Path:
     return _folder("FLOWNAV_PAPER", "paper")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Headless Chromium; a test that asks for it is skipped where there is none."""
+    if CHROMIUM is None:
+        pytest.skip("no Chromium here: install Debian's package `chromium` (apt-get install chromium)")
+    api = pytest.importorskip("playwright.sync_api", reason="install `playwright` (dependency group `test`)")
+    with api.sync_playwright() as running:
+        opened = running.chromium.launch(executable_path=CHROMIUM, args=QUIET)
+        yield opened
+        opened.close()

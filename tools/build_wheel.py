@@ -47,6 +47,17 @@ def _function(kernel: Path) -> str:
     return kernel.name.rpartition("-")[0]
 
 
+def left_out(kernel: Path, temporary: Path) -> bool:
+    """Whether a kernel names a folder of this machine, as one that may raise NumPy's errors does: said, not shipped.
+
+    Who installs the wheel compiles it at its first use.
+    """
+    told = PROJECT, temporary, Path.home(), Path(sys.prefix), Path(sys.base_prefix)
+    if found := machine_paths(kernel.read_bytes(), told):
+        print(f"left out: {kernel.name} names {', '.join(found)}", flush=True)
+    return bool(found)
+
+
 def machine_paths(content: bytes, folders: tuple[Path, ...]) -> list[str]:
     """Which of these folders of the building machine a file names."""
     return [str(folder) for folder in folders if os.fsencode(folder) + b"/" in content]
@@ -59,10 +70,8 @@ def main() -> None:
     GATHERED.mkdir(parents=True)
     with tempfile.TemporaryDirectory() as temporary:
         kernels = gather(Path(temporary))
-        told = PROJECT, Path(temporary), Path.home(), Path(sys.prefix), Path(sys.base_prefix)
-        for path in kernels:
-            if found := machine_paths(path.read_bytes(), told):
-                raise SystemExit(f"{path.name} names {', '.join(found)}: a wheel must not")
+        carried = [path for path in kernels if not left_out(path, Path(temporary))]
+        for path in carried:
             shutil.copyfile(path, GATHERED / path.name)
     pip = ("-m", "pip", "wheel", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-build-isolation")
     for old in DIST.glob("flownav-*.whl"):
@@ -70,7 +79,7 @@ def main() -> None:
     python(*pip, "--wheel-dir", DIST, PROJECT, FLOWNAV_KERNELS=GATHERED)
     (wheel,) = DIST.glob("flownav-*.whl")
     size = wheel.stat().st_size / 1e6
-    print(f"{wheel.relative_to(PROJECT)}: {len(kernels)} kernels, {size:.1f} MB, {time.monotonic() - start:.0f} s")
+    print(f"{wheel.relative_to(PROJECT)}: {len(carried)} kernels, {size:.1f} MB, {time.monotonic() - start:.0f} s")
 
 
 if __name__ == "__main__":

@@ -17,6 +17,8 @@ from flownav.cli import app
 from flownav.core.errors import VerdictError
 
 COMMANDS = (
+    "fly --no-report --out sortie.fnr",
+    "info sortie.fnr",
     "fly landing --seed 3 --out landing.fnr",
     "fly landing --flights 2 --no-report --out many.fnr",
     "fly landing --filter paper --flights 2 --no-report --out paper.fnr",

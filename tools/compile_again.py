@@ -14,6 +14,7 @@ from typing import Any
 
 from flownav.core.compiling.cache import SUFFIX, Store
 from flownav.core.compiling.engine import Kernel
+from flownav.core.compiling.loaded import MachineCode
 from flownav.core.compiling.units import Unit
 
 
@@ -28,14 +29,14 @@ def compile_again(folder: Path) -> int:
         payload = store.load(name)
         if payload is None:
             raise ValueError(f"{name} cannot be read")
-        _library, described, _environment, signature, *_ = pickle.loads(payload)
+        _library, described, _environment, signature, *_ = MachineCode(*pickle.loads(payload)).unpickled()
         made = 0
         for part in parts_of(described.modname, described.qualname):
             made += 1
             if isinstance(part, Unit):
                 assert part.address
             else:
-                part.compile(signature.args)
+                part.dispatcher.compile(signature.args)
         if not made:
             raise ValueError(f"{name}: {described.modname} has no kernel {described.qualname}")
     return len(names)

@@ -16,7 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaigns.faults.catalogue import FAULTS, Fault
+from flownav.campaigns.faults.catalogue import DEGREE_S, FAULTS, Fault
+from flownav.campaigns.faults.inject import biased
 from flownav.campaigns.faults.navigator import Navigate, Navigated, navigator_told, started
 from flownav.campaigns.faults.score import course_of
 from flownav.campaigns.faults.table import (
@@ -48,13 +49,23 @@ TOGETHER = "all faults"
 FIRST_SEED = 1000  # levels and suspicions were looked at with lower ones while they were made
 FAULTY_SEEDS, CLEAN_SEEDS = 75, 334  # 10 125 flights with a fault, 1002 without
 LONG_S, LONG_SEEDS = 60.0, 10  # faults that last, in 690 flights more
+AFTERWARDS_S = 10.0  # chosen
+_PARTS = {
+    "accelerometer down": (0.0, 0.0, 0.0, 0.0, 0.0, 0.3), "accelerometer level": (0.0, 0.0, 0.0, 0.3, 0.3, 0.0),
+    "gyro down": (0.0, 0.0, DEGREE_S, 0.0, 0.0, 0.0), "gyro level": (DEGREE_S, DEGREE_S, 0.0, 0.0, 0.0, 0.0),
+}  # fmt: skip
+# of `imu_bias`, each alone
+PARTS = tuple(
+    Fault(f"imu_bias, {name}", name, (Sensor.IMU,), biased(bias[:3], bias[3:])) for name, bias in _PARTS.items()
+)
 
 
 class Judged(NamedTuple):
     """One flight from the instant t0 on, (n,) steps of the estimate.
 
     error_m, level_m (n, 2): horizontal and vertical. said (n,): whether a warning stands. raised: the warnings that
-    were raised, "flow doubted", in the whole flight, or from t0 on where a sensor fails.
+    were raised, "flow doubted", in the whole flight, or from t0 on where a sensor fails. since_s (n,): since t0;
+    lasts_s: how long the fault lasts.
     """
 
     fault: str
@@ -62,6 +73,29 @@ class Judged(NamedTuple):
     level_m: NDArray[np.float32]
     said: NDArray[np.bool_]
     raised: frozenset[str]
+    since_s: NDArray[np.float32] = np.zeros(0, np.float32)
+    lasts_s: float = 0.0
+
+    @property
+    def above(self) -> NDArray[np.bool_]:
+        """(n, 2): whether the error is above the level unsaid; a level that is no number protects from nothing."""
+        found: NDArray[np.bool_] = ~(self.error_m <= self.level_m) & ~self.said[:, None]
+        return found
+
+
+class When(NamedTuple):
+    """When errors are above the level unsaid, for faults of one duration; pairs are horizontal and vertical.
+
+    beyond: flights in which they ever are. unsaid: share of all steps. shares: of those steps, while the fault lasts,
+    in the AFTERWARDS_S after it, and later.
+    """
+
+    fault: str
+    lasts_s: float
+    flights: int
+    beyond: tuple[int, int]
+    unsaid: tuple[float, float]
+    shares: tuple[tuple[float, float], ...]
 
 
 class Row(NamedTuple):
@@ -84,7 +118,7 @@ class Row(NamedTuple):
 
 
 # -- flights -----------------------------------------------------------------------------------------------------
-def judged(fault: str, flown: Navigated, truth: Table, t0_s: float, since_s: float) -> Judged:
+def judged(fault: str, flown: Navigated, truth: Table, t0_s: float, since_s: float, lasts_s: float = 0.0) -> Judged:
     """A run from t0 on, and the warnings that were raised from `since_s` on. ValueError where it states no levels."""
     if flown.levels_m is None:
         raise ValueError("a navigator without protection levels cannot be judged by them")
@@ -98,6 +132,8 @@ def judged(fault: str, flown: Navigated, truth: Table, t0_s: float, since_s: flo
         flown.levels_m[rows].astype(np.float32),
         flagged(course.t_s[after], flown.flags),
         frozenset(f"{flag.source} {flag.kind}" for flag in flown.flags if flag.t0_s >= since_s),
+        (course.t_s[after] - t0_s).astype(np.float32),
+        lasts_s,
     )
 
 
@@ -122,7 +158,7 @@ def fly(
                 t0_s = hover_s + longest_s + AFTER_S if fault.in_descent else hover_s
                 for duration_s in durations_of(fault, durations_s):
                     streams = fault.inject(log.streams, t0_s, t0_s + duration_s, seed)
-                    yield judged(fault.name, navigate(streams), truth, t0_s, t0_s)
+                    yield judged(fault.name, navigate(streams), truth, t0_s, t0_s, duration_s)
 
 
 # -- what came of them -------------------------------------------------------------------------------------------
@@ -131,7 +167,7 @@ def row_of(name: str, flights: Sequence[Judged]) -> Row:
     error = np.concatenate([flight.error_m for flight in flights])
     level = np.concatenate([flight.level_m for flight in flights])
     said = np.concatenate([flight.said for flight in flights])
-    above = ~(error <= level) & ~said[:, None]  # a level that is no number protects from nothing
+    above = np.concatenate([flight.above for flight in flights])
     warnings = Counter(warning for flight in flights for warning in flight.raised)
     beyond = np.where(above, error - level, 0.0).max(axis=0)
     ratio = np.median(level / np.maximum(error, 1e-6), axis=0)
@@ -157,6 +193,24 @@ def rows_of(flights: Iterable[Judged]) -> list[Row]:
     return rows + ([row_of(NO_FAULT, clean)] if clean else [])
 
 
+def whens_of(flights: Iterable[Judged]) -> list[When]:
+    """A row a fault and duration, in the order flown, of those whose error is ever above the level unsaid."""
+    grouped: dict[tuple[str, float], list[Judged]] = {}
+    for flight in flights:
+        grouped.setdefault((flight.fault, flight.lasts_s), []).append(flight)
+    found = []
+    for (fault, lasts_s), many in grouped.items():
+        above = np.concatenate([flight.above for flight in many])
+        after_s = np.concatenate([flight.since_s for flight in many]) - lasts_s
+        steps = np.maximum(above.sum(axis=0), 1)
+        spells = (after_s < 0.0, (after_s >= 0.0) & (after_s < AFTERWARDS_S), after_s >= AFTERWARDS_S)
+        shares = tuple(_pair(above[spell].sum(axis=0) / steps) for spell in spells)
+        north, down = (sum(bool(flight.above[:, axis].any()) for flight in many) for axis in range(2))
+        if north or down:
+            found.append(When(fault, lasts_s, len(many), (north, down), _pair(above.mean(axis=0)), shares))
+    return found
+
+
 def _pair(values: Array) -> tuple[float, float]:
     return float(values[0]), float(values[1])
 
@@ -179,6 +233,7 @@ def cost(told: Told, streams: dict[Sensor, Stream], repeats: int = 15) -> float:
 
 # -- as a page ---------------------------------------------------------------------------------------------------
 BEGIN, END = "<!-- make integrity: begin -->", "<!-- make integrity: end -->"
+WHEN_BEGIN, WHEN_END = "<!-- make integrity, when: begin -->", "<!-- make integrity, when: end -->"
 HEADINGS = (
     "fault", "flights", "suspected [% of flights]", "warning stands [% of steps]",
     "above the level unsaid, horizontal [‰ of steps]", "vertical [‰]", "at most above [m]", "vertical [m]",
@@ -207,6 +262,24 @@ def section(rows: Sequence[Row], long: Sequence[Row], seeds: tuple[int, int], co
     )
 
 
+WHEN_HEADINGS = (
+    "fault", "lasts [s]", "flights", "ever above, horizontal", "vertical",
+    "above unsaid, horizontal [‰ of steps]", "vertical [‰]",
+    "of these while it lasts / 10 s after / later, horizontal [%]", "vertical [%]",
+)  # fmt: skip
+
+
+def when_table(rows: Sequence[When]) -> str:
+    """The rows as a Markdown table."""
+    lines = [WHEN_HEADINGS, ("---", *["---:"] * (len(WHEN_HEADINGS) - 1))]
+    for row in rows:
+        spells = [" / ".join(f"{100.0 * pair[axis]:.0f}" for pair in row.shares) for axis in range(2)]
+        shown = [said if row.beyond[axis] else "-" for axis, said in enumerate(spells)]
+        unsaid = [f"{1000.0 * share:.2f}" for share in row.unsaid]
+        lines.append((f"`{row.fault}`", f"{row.lasts_s:g}", str(row.flights), *map(str, row.beyond), *unsaid, *shown))
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
 def alarms(row: Row) -> str:
     """The warnings of flights in which nothing failed."""
     counted = {SUSPECTS: 0.0, **row.raised}
@@ -214,13 +287,13 @@ def alarms(row: Row) -> str:
     return f"Warnings in the {row.flights} flights in which nothing fails: {said}."
 
 
-def placed(page: str, text: str, name: str) -> str:
+def placed(page: str, text: str, name: str, first: str = BEGIN, last: str = END) -> str:
     """A page with a text between its two marks. InputError where it lacks them."""
-    before, begin, rest = page.partition(BEGIN)
-    _, end, after = rest.partition(END)
+    before, begin, rest = page.partition(first)
+    _, end, after = rest.partition(last)
     if not (begin and end):
-        raise InputError(f"{name}: lacks the lines {BEGIN} and {END}; put them where the table belongs")
-    return f"{before}{BEGIN}\n\n{text}\n{END}{after}"
+        raise InputError(f"{name}: lacks the lines {first} and {last}; put them where the table belongs")
+    return f"{before}{first}\n\n{text}\n{last}{after}"
 
 
 def _cells(row: Row) -> tuple[str, ...]:
@@ -235,25 +308,36 @@ def _cells(row: Row) -> tuple[str, ...]:
 TOLD_EVERY = 1000  # flights
 
 
-def main(page: Path) -> None:
-    """Fly, print and write. FlownavError where the page has no place for the table."""
+def main(page: Path, seeds: int | None = None, faulty_seeds: int | None = None) -> None:
+    """Fly, print and write; with `seeds` the last table, of so many, and the others only where `faulty_seeds` says of
+    how many, with four times as many without a fault. FlownavError where the page has no place.
+    """
     text = page.read_text(encoding="utf-8")
-    placed(text, "", str(page))
+    placed(placed(text, "", str(page)), "", str(page), WHEN_BEGIN, WHEN_END)
     fitted = assemble(load_scenario(BASE)).fitted
     assert fitted is not None
-    faulty, clean = (range(FIRST_SEED, FIRST_SEED + count) for count in (FAULTY_SEEDS, CLEAN_SEEDS))
-    lasting = range(FIRST_SEED, FIRST_SEED + LONG_SEEDS)
     navigate = navigator_told(fitted.told)
-    rows = rows_of(counted(fly(navigate, faulty, clean)))
-    long = rows_of(counted(fly(navigate, lasting, (), durations_s=(LONG_S,))))
-    spent = cost(fitted.told, flight_at(1.5, 5.0, FIRST_SEED).streams)
-    found = section(rows, long, (clean[0], clean[-1]), spent)
-    with written_whole(page) as temporary:
-        temporary.write_text(placed(text, found, str(page)), encoding="utf-8", newline="\n")
+    few = range(FIRST_SEED, FIRST_SEED + (seeds or LONG_SEEDS))
+    lasting = list(counted(fly(navigate, few, (), durations_s=(LONG_S,))))
+    if seeds is None or faulty_seeds is not None:
+        counts = (FAULTY_SEEDS, CLEAN_SEEDS) if faulty_seeds is None else (faulty_seeds, 4 * faulty_seeds)
+        faulty, clean = (range(FIRST_SEED, FIRST_SEED + count) for count in counts)
+        rows = rows_of(counted(fly(navigate, faulty, clean)))
+        spent = cost(fitted.told, flight_at(1.5, 5.0, FIRST_SEED).streams)
+        found = section(rows, rows_of(lasting), (clean[0], clean[-1]), spent)
+        text = placed(text, found, str(page))
+        print(found)
+    shorter = counted(fly(navigate, few, (), durations_s=DURATIONS_S[-1:]))
+    parts = (flight for s in (DURATIONS_S[-1], LONG_S) for flight in fly(navigate, few, (), PARTS, durations_s=(s,)))
+    whens = whens_of([*shorter, *lasting, *counted(parts)])
+    found = f"Printed by `make integrity`, seeds {few[0]} to {few[-1]}.\n\n{when_table(whens)}"
     print(found)
+    with written_whole(page) as temporary:
+        again = placed(text, found, str(page), WHEN_BEGIN, WHEN_END)
+        temporary.write_text(again, encoding="utf-8", newline="\n")
 
 
-def counted(flights: Iterator[Judged]) -> Iterator[Judged]:
+def counted(flights: Iterable[Judged]) -> Iterator[Judged]:
     """The same flights; how many there were is said on the way."""
     for count, flight in enumerate(flights, 1):
         if count % TOLD_EVERY == 0:
@@ -262,9 +346,10 @@ def counted(flights: Iterator[Judged]) -> Iterator[Judged]:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
-        sys.exit("usage: python tools/integrity.py PAGE")
+    told = sys.argv[1:]
+    if len(told) not in (1, 2, 3) or not all(count.isdecimal() and int(count) > 0 for count in told[1:]):
+        sys.exit("usage: python tools/integrity.py PAGE [SEEDS of the last tables [SEEDS of the first]]")
     try:
-        main(Path(sys.argv[1]))
+        main(Path(told[0]), *map(int, told[1:]))
     except (FlownavError, OSError) as error:
         sys.exit(f"flownav: {error}")

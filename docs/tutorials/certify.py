@@ -16,7 +16,7 @@ from pathlib import Path
 Path("my-landing.toml").write_text("""
 schema_version = 1
 name = "my_landing"
-description = "The paper's landing in up to 4 m/s of wind: half a metre at the touchdown"
+description = "The paper's landing in up to 4 m/s of wind: a metre at the touchdown"
 scenario = "landing"
 
 [conditions]

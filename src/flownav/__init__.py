@@ -1,7 +1,8 @@
 """flownav: GPS/INS + optical-flow navigation for precision VTOL take-off and landing.
 
-The public API: `fly`, `replay`, `identify`, `campaign` and `load` give a `Record`, a `Sensor` or a `Campaign`;
-`Scenario`, `Sensor` and `Vehicle` are what they take. Each is loaded when it is first asked for.
+The public API: `fly`, `replay`, `identify`, `campaign` and `load` give a `Record`, a `Sensor` or a `Campaign`, and
+`explain` why a log drifted; `Scenario`, `Sensor` and `Vehicle` are what they take; `build` and `verify` are the
+navigator for other processors. Each is loaded when it is first asked for.
 """
 
 from importlib import import_module
@@ -10,8 +11,10 @@ from typing import TYPE_CHECKING, Any
 from flownav.core.version import __version__
 
 if TYPE_CHECKING:
+    from flownav.api.building import build, verify
     from flownav.api.campaign import Campaign
     from flownav.api.campaigning import campaign
+    from flownav.api.explaining import explain
     from flownav.api.flying import fly
     from flownav.api.identifying import identify
     from flownav.api.record import Record, load
@@ -31,11 +34,14 @@ _PLACES = {
     "Sensor": "flownav.api.sensor",
     "Table": "flownav.api.table",
     "Vehicle": "flownav.api.vehicle",
+    "build": "flownav.api.building",
     "campaign": "flownav.api.campaigning",
+    "explain": "flownav.api.explaining",
     "fly": "flownav.api.flying",
     "identify": "flownav.api.identifying",
     "load": "flownav.api.record",
     "replay": "flownav.api.replaying",
+    "verify": "flownav.api.building",
 }
 
 __all__ = [
@@ -48,11 +54,14 @@ __all__ = [
     "Table",
     "Vehicle",
     "__version__",
+    "build",
     "campaign",
+    "explain",
     "fly",
     "identify",
     "load",
     "replay",
+    "verify",
 ]
 
 

@@ -8,13 +8,34 @@ import sys
 import pytest
 
 HEAVY = ("numpy", "numba", "scipy", "pandas", "polars", "xarray", "plotly", "pyarrow", "pydantic", "typer", "rich")
+# what a command that flies, replays or shows one flight has no use for, though it is installed
+NEVER = ("numba", "pandas", "plotly", "scipy.special", "scipy.linalg", "scipy.signal", "scipy.spatial", "scipy.stats",
+         "scipy.ndimage", "scipy.optimize", "scipy.interpolate", "numpy.f2py", "PIL", "ray", "matplotlib")  # fmt: skip
 
 
-def loaded_by(code: str) -> set[str]:
-    """The modules of HEAVY that a fresh interpreter has after this code."""
-    said = f"{code}\nimport sys\nprint(*[name for name in {HEAVY!r} if name in sys.modules])"
+def loaded_by(code: str, of: tuple[str, ...] = HEAVY) -> set[str]:
+    """The modules among these that a fresh interpreter has after this code, all of whose kernels are compiled: the
+    compiler itself loads more.
+    """
+    said = f"{code}\nimport sys\nprint(*[name for name in {of!r} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", said], capture_output=True, text=True, check=True)
-    return set(done.stdout.split())
+    if "compiling" in done.stderr:
+        done = subprocess.run([sys.executable, "-c", said], capture_output=True, text=True, check=True)
+    return set(done.stdout.splitlines()[-1].split()) if done.stdout.strip() else set()
+
+
+def loaded_by_command(*words: str, of: tuple[str, ...] = HEAVY) -> set[str]:
+    """The same of a command that ends well."""
+    code = f"""
+import sys
+from flownav.cli import main
+sys.argv = ['flownav', *{words!r}]
+try:
+    main()
+except SystemExit as ended:
+    assert not ended.code, ended.code
+print()"""
+    return loaded_by(code, of)
 
 
 @pytest.mark.parametrize("code", ["import flownav", "import flownav; flownav.__version__; dir(flownav)",
@@ -49,3 +70,29 @@ try:
 except SystemExit as ended:
     assert ended.code == 2, ended.code"""
     assert not loaded_by(code) & {"numpy", "numba", "scipy"}
+
+
+@pytest.mark.parametrize("words", [["--help"], ["--version"], ["fly", "--help"], ["campaign", "--help"]])
+def test_help_loads_nothing_that_computes(words):
+    assert not loaded_by_command(*words) & {"numpy", "numba", "scipy", "pyarrow", "pandas", "plotly"}
+
+
+@pytest.mark.parametrize("words", [["--list"], ["--list", "--json"]])
+def test_the_list_of_samples_is_told_without_flying_any(words):
+    assert not loaded_by_command("sample", *words) & {"numpy", "numba", "scipy", "pyarrow", "pandas", "plotly"}
+
+
+def test_a_flight_its_report_and_its_replay_load_only_what_they_use(tmp_path):
+    """By name, not by time: pandas comes with the first array that pyarrow is given, scipy.signal was half of info."""
+    record = str(tmp_path / "flight.fnr")
+    assert loaded_by_command("fly", "landing", "--no-report", "--out", record, of=NEVER) == set()
+    assert loaded_by_command("info", record, of=NEVER) == set()
+    assert loaded_by_command("replay", record, "--no-report", "--out", str(tmp_path / "again.fnr"), of=NEVER) == set()
+    report = loaded_by_command("report", record, "--out", str(tmp_path / "page.html"), of=NEVER)
+    assert report <= {"scipy.special", "numpy.f2py"}  # the limits of chi squared
+
+
+def test_a_log_of_csv_files_is_looked_at_with_no_more(tmp_path):
+    made = str(tmp_path / "made")
+    loaded_by_command("sample", "csv", "--out", made)
+    assert loaded_by_command("info", f"{made}/flight-csv", of=NEVER) == set()

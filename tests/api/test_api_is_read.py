@@ -45,8 +45,8 @@ FUNCTIONS = {place: thing for place, thing in DOCUMENTED.items() if not inspect.
 
 def test_the_members_are_what_the_design_names():
     assert set(NAMES) == {
-        "Campaign", "FlownavError", "InputError", "Record", "Scenario", "Sensor", "Table", "Vehicle", "campaign", "fly",
-        "identify", "load", "replay",
+        "Campaign", "FlownavError", "InputError", "Record", "Scenario", "Sensor", "Table", "Vehicle", "build",
+        "campaign", "explain", "fly", "identify", "load", "replay", "verify",
     }  # fmt: skip
     asked = {"rescore", "score", "scores", "plot", "report", "save", "export", "load", "verdict", "name", "of"}
     assert {place.partition(".")[2] for place in MEMBERS if place.startswith("Record.")} == asked

@@ -186,13 +186,13 @@ def test_an_estimate_of_a_part_of_the_flight_is_said_to_be_one():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: flownav.fly("landing", seed=1.9), "seed = 1.9: must be a whole number"),
-        (lambda: flownav.campaign("landing", flights=2.5), "flights = 2.5: must be a whole number"),
+        (lambda: flownav.fly("landing", seed=1.9), "seed: 1.9 is given; a whole number is needed"),
+        (lambda: flownav.campaign("landing", flights=2.5), "flights: 2.5 is given; a whole number is needed"),
         (lambda: flownav.campaign("landing", sweep={"wind.speed_20ft_m_s": []}), "sweep wind.speed_20ft_m_s: a list"),
         (lambda: flownav.campaign("landing", sweep={"wind.speed_20ft_m_s": 3.0}), "sweep wind.speed_20ft_m_s: a list"),
-        (lambda: flownav.fly("landing", sensors=object), "sensors: a list of them is needed"),
-        (lambda: flownav.replay(3), "log: int is given; a path is needed"),
-        (lambda: flownav.identify(None), "logs: NoneType is given"),
+        (lambda: flownav.fly("landing", sensors=object), "sensors: type is given; a list is needed"),
+        (lambda: flownav.replay(3), "log: 3 is given; a path is needed"),
+        (lambda: flownav.identify(None), "logs: None is given; a path or a list is needed"),
         (lambda: flownav.replay("x.ulg", filter="paper"), "the paper's filter flies in simulation only"),
     ],
 )

@@ -99,6 +99,8 @@ def test_a_record_is_shown_in_two_lines_and_as_a_table_of_escaped_text(record):
     assert "<script>" not in nasty._repr_html_()
     assert "&lt;script&gt;" in nasty._repr_html_()
     assert repr(flownav.Record()).startswith("<Record ? nothing, filter ?: not scored")
+    own = flownav.Record({"kind": "fly", "filter": "landing", "parts": {"controller": "Mine", "sensors": ["A", "B"]}})
+    assert "filter landing, own sensors A, B, own controller Mine:" in repr(own)
 
 
 @pytest.mark.parametrize("what", ["position", "velocity", "errors", "innovations", "path"])

@@ -22,7 +22,7 @@ from flownav.campaigns.local import fly_many, home_epoch, known_exactly
 from flownav.cli import app
 from flownav.core.errors import InputError, VerdictError
 from flownav.core.measurement import Sensor
-from flownav.scoring.consistency import GROUP_FLIGHTS
+from flownav.scoring.consistency import GROUP_FLIGHTS, inside_steps
 from flownav.sensors.flow import flow_noise_sigma
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario, with_filter
@@ -162,7 +162,7 @@ def test_judged_flights_have_the_scores_of_plain_ones_and_no_lane_of_the_last_bl
     in_all = epochs - flight.table.horizon_epochs
     assert started < 60  # a shaken vehicle levels itself for a second
     assert judged.sums.errors.steps.sum() == judged.sums.running.sum()
-    assert [steps for _, steps in judged.groups] == [in_all - started]  # one whole group; the rest is left out
+    assert [inside_steps(group)[1] for group in judged.groups] == [in_all - started]  # a rest is left out
     few = fly_judged(flight, 3, 5)
     assert len(few.groups) == 1
     worst = np.abs(judged.flown.squares).max()
@@ -187,13 +187,18 @@ def test_the_command_says_every_target_and_writes_what_it_prints(tmp_path):
     out = tmp_path / "accuracy.md"
     done = run("--flights", 16, "--cases", "takeoff, approach", "--ablations", 16, "--out", out)
     assert done.exception is None or isinstance(done.exception, VerdictError)
-    assert done.stdout.strip() == out.read_text(encoding="utf-8").strip()
+    mark, _, table = out.read_text(encoding="utf-8").partition("\n")
+    assert mark.startswith("<!-- written by flownav; SHA-256 of what follows: ")
+    assert done.stdout.strip() == table.strip()
     assert "takeoff without" in done.stdout
     assert "96 flights" not in done.stdout  # 16 were flown
     assert done.stdout.count("steps with the ANEES of 16 flights in its") == 4 + 2  # targets, two tables
     for truth_model in ("matched", "ensemble"):
         assert f"{truth_model}: RMSE over the bound of the filter's own model, at the horizon" in done.stdout
         assert f"| {truth_model}: touchdown " in done.stdout
+        (heading,) = (line for line in done.stdout.splitlines() if f"{truth_model}: RMSE of the autopilot's" in line)
+        assert " in flight [m, m/s, °] | x " in heading
+        assert [cell.strip() for cell in heading.split("|")][8:11] == ["roll", "pitch", "yaw"]
     assert "| takeoff  | where it stands until take-off at 10 s " in done.stdout
     assert "| pad fix " in done.stdout
     for line in done.stdout.splitlines():
@@ -210,6 +215,8 @@ def test_json_has_every_figure_and_the_exit_status_follows_the_targets():
         assert set(facts["rmse_over_bound"]) == set("xyzuvw")
         assert all(0.1 < ratio < 10.0 for ratio in facts["rmse_over_bound"].values())
         assert 0.03 < facts["p95_largest_axis_m"] < 1.0
+        assert set(facts["rms_attitude_deg"]) == {"roll", "pitch", "yaw"}
+        assert all(0.01 < angle < 10.0 for angle in facts["rms_attitude_deg"].values())
         assert 0.0 < facts["touchdown"]["success"]["rate"] <= 1.0
     assert {target["truth_model"] for target in case["targets"]} == {"matched", "ensemble"}
     assert case["matched"]["p95_largest_axis_m"] != case["ensemble"]["p95_largest_axis_m"]

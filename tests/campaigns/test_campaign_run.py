@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 
 from command import printed
 from command import run as typed
+from flownav.campaigns import run as running
 from flownav.campaigns.engines import Local, Part, neighbours
 from flownav.campaigns.local import fly_many
 from flownav.campaigns.plan import planned
@@ -153,6 +154,77 @@ def test_parts_that_follow_each_other_are_flown_together():
     assert list(neighbours([])) == []
 
 
+# -- a part that is being flown ---------------------------------------------------------------------------------
+class Killed(Exception):
+    pass
+
+
+def killed_after(flights):
+    """A watch at which a campaign ends, as if it was killed, once so many flights have flown."""
+
+    def watch(progress):
+        if progress.flown >= flights:
+            raise Killed
+
+    return watch
+
+
+def flown_watched(folder, plan, watch):
+    with Store(folder).opened(plan) as store:
+        run_campaign(plan, Local(threads=1), store, watch)
+
+
+def test_what_has_flown_of_a_part_is_saved_and_gone_on_with_to_the_same_bytes(tmp_path, monkeypatch):
+    plan, told = plan_of(PART + 100), []
+    monkeypatch.setattr(running, "SAVE_S", 0.0)
+    for flights in (100, 60, 160):  # twice in the first part, once in the second
+        with pytest.raises(Killed):
+            flown_watched(tmp_path / "killed", plan, killed_after(flights))
+        (begun,) = (tmp_path / "killed").rglob("begun-*.parquet")
+        told.append((begun.name, Dataset(tmp_path / "killed").parts(0)))
+    assert [name for name, _ in told] == ["begun-00000.parquet", "begun-00000.parquet", "begun-00001.parquet"]
+    assert [len(parts) for _, parts in told] == [0, 0, 1]
+    seen = []
+    flown_watched(tmp_path / "killed", plan, seen.append)
+    assert seen[-1].have == PART + 100
+    assert seen[-1].flown <= PART + 100 - (100 - 32) - (60 - 32) - (160 - 32)  # but for two blocks each, all were kept
+    monkeypatch.undo()
+    flown(tmp_path / "whole", plan)
+    assert files_in(tmp_path / "killed") == files_in(tmp_path / "whole")
+
+
+@pytest.mark.parametrize("harm", [b"", b"PAR1 and more", None], ids=["empty", "no Parquet", "of other flights"])
+def test_what_was_saved_and_is_damaged_is_told_of_and_flown_again(tmp_path, monkeypatch, harm):
+    plan, seen = plan_of(64), []
+    monkeypatch.setattr(running, "SAVE_S", 0.0)
+    for seed in (5, 6):
+        with pytest.raises(Killed):
+            flown_watched(tmp_path / str(seed), plan_of(64, seed=seed), killed_after(48))
+    (begun,), (strange,) = ((tmp_path / name).rglob("begun-*.parquet") for name in ("5", "6"))
+    begun.write_bytes(strange.read_bytes() if harm is None else harm)
+    flown_watched(tmp_path / "5", plan, seen.append)
+    assert seen[-1].flown == 64
+    assert [str(begun) in one for one in seen[-1].damaged] == ([] if harm is None else [True])
+    flown(tmp_path / "whole", plan)
+    assert files_in(tmp_path / "5") == files_in(tmp_path / "whole")
+
+
+@pytest.mark.parametrize(("block_s", "saved"), [(0.1, 0), (4.0, 5), (60.0, 15)])
+def test_a_part_is_saved_by_time_and_not_by_flights(tmp_path, monkeypatch, block_s, saved):
+    """A clock on which each block of 16 flights takes so long: a part of 16 blocks, the last of which is the part."""
+    now, written = [0.0], []
+    monkeypatch.setattr(running.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(Store, "write_begun", lambda store, cell, part, rows, before: written.append(now[0]))
+
+    def watch(progress):
+        now[0] = block_s * (progress.flown // 16)
+
+    flown_watched(tmp_path, plan_of(PART), watch)
+    assert len(written) == saved
+    assert max(np.diff([0.0, *written, now[0]]), default=0.0) <= max(running.SAVE_S + block_s, 16 * 0.1)
+    assert running.SAVE_S <= 10.0
+
+
 # -- kills ------------------------------------------------------------------------------------------------------------
 def campaign_of(folder, flights):
     return [
@@ -225,6 +297,40 @@ def test_killed_twenty_times_it_ends_with_the_same_bytes(tmp_path):
     assert files_in(tmp_path / "killed") == files_in(tmp_path / "whole")
 
 
+def two_killed_and_gone_on(folder, command, kills, seed):
+    """Two runs at once in one folder, both killed at any time, so many times; what those that ended by themselves said.
+
+    One flies and the other says so; where the first is killed, the second may have its place in the next turn.
+    """
+    rng, ends = random.Random(seed), []
+    for _ in range(kills):
+        pair = [subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) for _ in range(2)]
+        had, deadline = len(Dataset(folder).parts(0)), time.monotonic() + 300.0
+        while len(Dataset(folder).parts(0)) <= had and None in [run.poll() for run in pair]:
+            assert time.monotonic() < deadline
+            time.sleep(0.002)
+        rng.shuffle(pair)
+        for run in pair:
+            time.sleep(rng.uniform(0.0, 0.3))
+            run.kill()  # which may have ended by now
+        ends += [(run.communicate()[1].decode(), run.returncode) for run in pair]
+    return ends
+
+
+@pytest.mark.slow
+def test_two_runs_at_once_in_one_folder_killed_twenty_times_end_with_the_same_bytes(tmp_path):
+    killed, whole = (command_of(tmp_path / name, 60 * PART) for name in ("killed", "whole"))
+    ends = two_killed_and_gone_on(tmp_path / "killed", killed, 20, 3)
+    assert {status for _, status in ends} <= {-signal.SIGKILL, 0, 2}
+    refused = [said for said, status in ends if status == 2]
+    assert refused
+    assert all("another process is flying this campaign" in said for said in refused)
+    assert not any("Traceback" in said for said, _ in ends)
+    for command in (killed, whole):
+        subprocess.run(command, check=True, capture_output=True)
+    assert files_in(tmp_path / "killed") == files_in(tmp_path / "whole")
+
+
 # -- the command ------------------------------------------------------------------------------------------------------
 def run(*arguments):
     return CliRunner().invoke(app, ["campaign", *arguments])
@@ -293,6 +399,13 @@ def test_a_stop_that_was_not_reached_is_said(tmp_path):
         (["landing", "--until", "soon"], "--until"),
         (["takeoff", "--until", "r95_m width <= 0.01"], "never lands"),
         (["landing", "landing"], "the same name"),
+        (
+            [
+                "landing",
+                *(f"--sweep={name}=0:9000:1" for name in ("pad.size_m", "wind.speed_20ft_m_s", "filter.handover_s")),
+            ],
+            "729243027001 combinations; at most 10000",
+        ),
         (["landing", "--set", "wind.gusts=true", "--sweep", "wind.gusts=true,false"], "is set as well"),
         (["landing", "--sweep", "pad.size_m=1,2", "--sweep", "pad.size_m=3,4"], "given twice"),
         (["landing", "--records", "11"], "--records"),
@@ -311,3 +424,16 @@ def test_mistakes_are_told_in_one_line(tmp_path, monkeypatch, arguments, words):
     assert words in printed(found.exception)
     assert "\n" not in str(found.exception)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("changes", [SHORT, {"flight.duration_s": 8.0}], ids=["paper", "landing"])
+@pytest.mark.parametrize("truth_model", ["ensemble", "matched"])
+def test_single_flights_from_anywhere_share_blocks_and_are_the_same_to_the_bit(changes, truth_model):
+    ready = plan_of(100, changes=changes, truth_models=[truth_model]).ready(0)
+    ((_, rows),) = Local().fly(ready, 5, [Part(0, 0, 100)])
+    numbers = [97, 3, 4, 50, *range(60, 80, 3), 2, 11, 99, 31, 32, 33, 90, 12]
+    told = []
+    found = list(Local().fly(ready, 5, [Part(k, number, 1) for k, number in enumerate(numbers)], told.append))
+    assert [part.number for part, _ in found] == list(range(len(numbers)))
+    assert np.concatenate([one for _, one in found]).tobytes() == rows[numbers].tobytes()
+    assert told == [16, len(numbers) - 16]

@@ -59,9 +59,9 @@ def test_the_figure_has_a_ring_a_speed_that_begins_where_the_last_one_ends(landi
         for speed in (3.0, 8.0) for direction in (0.0, 90.0, 180.0, 270.0)
     ]  # fmt: skip
     inner, outer = envelope_figure("title", rows).data
-    assert (list(inner.base), list(inner.r), list(inner.width)) == ([0.0] * 4, [3.0] * 4, [90.0] * 4)
-    assert (list(outer.base), list(outer.r)) == ([3.0] * 4, [5.0] * 4)
-    assert "8 m/s from 270°<br>landed 50.0 % (95 % interval 20.0..80.0 %)" in outer.hovertext[3]
+    assert (inner["base"], inner["r"], inner["width"]) == ([0.0] * 4, [3.0] * 4, [90.0] * 4)
+    assert (outer["base"], outer["r"]) == ([3.0] * 4, [5.0] * 4)
+    assert "8 m/s from 270°<br>landed 50.0 % (95 % interval 20.0..80.0 %)" in outer["hovertext"][3]
 
 
 def run(*arguments):

@@ -72,7 +72,7 @@ def certified(tmp_path, text, engine, flights=None, rows=0, folder="out"):
     with Store(tmp_path / folder).opened(plan) as store:
         certificate = certify(asked, plan, engine, store)
         if rows:
-            certificate = with_ranking(certificate, engine, store, rows)
+            certificate = with_ranking(certificate, engine, store.folder, rows)
         return certificate, write_certificate(certificate, store, path, 2 if isinstance(engine, Local) else 0)
 
 

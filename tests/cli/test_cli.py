@@ -140,7 +140,7 @@ def test_many_flights_turn_every_number_into_median_and_percentiles(tmp_path):
 
 def landing_at_once(tmp_path):
     """From 0.5 m down at once, so that a few seconds hold a whole landing."""
-    path = short(tmp_path, duration="12.0")
+    path = short(tmp_path, duration="30.0")  # it learns the vehicle first
     text = path.read_text(encoding="utf-8").replace("may_land_after_s = 10.0", "may_land_after_s = 1.0")
     text = text.replace("{ t_s = 0.0, height_m = 3.0 }", "{ t_s = 0.0, height_m = 0.5 }")
     text = text.replace("{ t_s = 10.0, height_m = 3.0 }", "{ t_s = 2.0, height_m = 0.5 }")

@@ -23,7 +23,8 @@ from places import DOCS
 APP = typer.main.get_command(app)
 COMMANDS = APP.commands  # type: ignore[attr-defined]
 GRAMMAR = (DOCS / "reference" / "cli-grammar.md").read_text(encoding="utf-8")
-KEEP_FLIGHTS = {"campaign", "certify"}
+KEEP_FLIGHTS = {"campaign", "certify", "sitl"}
+OWN = {("sitl", "--vehicle")}  # of the autopilot's simulator, which is not one of ours
 PRINTS_JSON = {"schema"}
 SAME = ("--json", "--force", "--seed", "--sensor", "--settings", "--vehicle", "--engine", "--flow-instance",
         "--gps-delay", "--signing-key")  # fmt: skip
@@ -60,7 +61,7 @@ def test_who_writes_has_out_with_its_default_and_force(name):
 def test_an_option_says_the_same_everywhere():
     for option in SAME:
         said = {(options(name)[option].help, options(name)[option].metavar)  # type: ignore[attr-defined]
-                for name in COMMANDS if option in options(name)}  # fmt: skip
+                for name in COMMANDS if option in options(name) and (name, option) not in OWN}  # fmt: skip
         assert len(said) == 1, f"{option}: {said}"
         assert f"`{option}" in GRAMMAR or option == "--engine"
 
@@ -210,3 +211,44 @@ def test_info_fits_80_columns(tmp_path, name):
     assert "…" not in done.stdout
     assert any(re.search(r"sensor +readings +rate \[Hz\] +from \[s\] +to \[s\] +gap \[s\] +no data \[%\]", line)
                for line in lines)  # fmt: skip
+
+
+INTERRUPTED = """
+import signal, sys
+
+module = sys.argv.pop(1)
+
+class Interrupts:
+    def find_spec(self, name, path=None, target=None):
+        if name == module:
+            signal.raise_signal(signal.SIGINT)
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.meta_path.insert(0, Interrupts())
+from flownav.__main__ import main
+main()
+"""
+
+
+@pytest.mark.parametrize("module", ["flownav.cli", "typer", "flownav.cli.fly", "flownav.api.calls", "llvmlite"])
+def test_an_interrupt_while_modules_are_loaded_ends_without_a_word(module, tmp_path):
+    asked = [sys.executable, "-c", INTERRUPTED, module, "fly", "landing", "--out", str(tmp_path / "x.fnr")]
+    done = subprocess.run(asked, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupt_that_is_ignored_stays_ignored():
+    ignored = INTERRUPTED.replace("default_int_handler", "SIG_IGN")
+    done = subprocess.run([sys.executable, "-c", ignored, "typer", "--version"], capture_output=True, text=True)
+    assert done.returncode == 0
+    assert done.stdout.startswith("flownav ")
+
+
+def test_too_little_memory_is_one_line(monkeypatch):
+    def none_left(*given, **more):
+        raise MemoryError
+
+    monkeypatch.setattr("flownav.export.samples.kinds.write_samples", none_left)
+    done = run("sample", "tlog")
+    assert (done.returncode, done.stderr) == (2, "flownav: there is not enough memory for this; give less at once\n")

@@ -17,6 +17,7 @@ from flownav.cli import replay as replay_command
 from flownav.core.errors import InputError
 from flownav.core.frames import quaternion_from_euler
 from flownav.core.measurement import Sensor
+from flownav.lab.identification.first_look import Look
 from flownav.logs.open_log import open_log
 from flownav.scoring.path import autopilot_errors
 from flownav.studies.inspection import summarise
@@ -181,7 +182,8 @@ def test_a_slow_imu_alone_cannot_be_replayed_and_info_says_why(flown, tmp_path):
 def test_people_see_the_same(ulog):
     result = call(replay_command.info, ulog)
     assert result.exception is None
-    for said in ("garden.ulg: 40.0 s", "flow_rate", "Clock: nothing found", "Stated limits of range_m: 0.1 to 12",
+    for said in ("garden.ulg: 40.0 s", "flow_rate", "Clock: no gap, no jump, nothing repeated",
+                 "Stated limits of range_m: 0.1 to 12",
                  "The autopilot's own estimate: PX4 EKF2", "against GPS"):  # fmt: skip
         assert said in result.stdout
 
@@ -305,3 +307,14 @@ def test_a_real_log_of_two_flow_sensors(data_folder):
     second = facts_of(path, "--flow-instance", "1")
     assert next(s for s in second["streams"] if s["sensor"] == "flow_rate")["count"] == 14438
     assert Sensor.IMU.name.lower() not in streams
+
+
+@pytest.mark.parametrize(("lag_s", "scale", "said"), [
+    (0.2, 1.02, "flow and GPS agree: lag 0.20 s, scale 1.02"),
+    (-0.06, 0.88, "flow and GPS agree in shape, not in size and time: the flow reads 12 % too little and it lies "
+     "0.06 s behind GPS (lag -0.06 s, scale 0.88)"),
+    (0.0, 1.2, "flow and GPS agree in shape, not in size and time: the flow reads 20 % too much "
+     "(lag 0.00 s, scale 1.20)"),
+])  # fmt: skip
+def test_flow_that_differs_in_size_and_time_does_not_simply_agree(lag_s, scale, said):
+    assert Look("GPS", 0.97, lag_s, scale, "axes and signs are right", True, True, 0.0, False).verdict == said

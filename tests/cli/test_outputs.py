@@ -7,11 +7,14 @@ import os
 import shutil
 import sys
 import time
+from io import StringIO
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from flownav.cli import main
+from flownav.cli.output import fitted, table
 from flownav.core.parameter_files import shipped
 from flownav.core.record import Record
 from replay_logs import log_of_flight
@@ -201,3 +204,25 @@ def test_what_is_there_is_kept_and_the_output_numbered(here, capsys, monkeypatch
     assert Path(name).read_text() == "mine\n"
     assert Path(written).stat().st_size > 100
     assert str(Path(written).parent if command.startswith("rig") else Path(written)) in told.out + told.err
+
+
+@pytest.mark.parametrize("columns", [60, 80, 120, 400])
+def test_a_table_fits_the_terminal_and_loses_nothing(columns):
+    heads = ["fault", *(f"figure {k} [m]" for k in range(12)), "what was said of it"]
+    rows = [[f"kind_{r}", *(f"{r * k / 7:.3f} ({k}-{r})" for k in range(12)), f"words_{r} " * 12] for r in range(5)]
+    console = Console(width=columns, force_terminal=True, file=StringIO(), color_system=None)
+    made = table(heads, rows, left=1, title="Many figures")
+    made.columns[-1].justify = "left"
+    parts = list(fitted(made, console))
+    for part in parts:
+        console.print(part)
+    printed = console.file.getvalue()
+    assert max(map(len, printed.splitlines())) <= columns
+    assert (len(parts) == 1) is (columns == 400)
+    assert printed.count("Many figures") == 1
+    assert "…" not in printed
+    for row in rows:
+        assert all(printed.count(f" {cell} ") >= 1 for cell in row[1:-1])
+        assert printed.count(f"words_{row[0][-1]}") == 12
+    assert all(len(part.columns) > 1 for part in parts)
+    assert {tuple(part.columns[0].cells) for part in parts} == {tuple(row[0] for row in rows)}

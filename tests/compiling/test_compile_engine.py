@@ -14,6 +14,7 @@ from flownav.core.compile import LANES, ONE_LANE, equation, kernel, pointer, pro
 from flownav.core.compiling import target
 from flownav.core.compiling.cache import STORE
 from flownav.core.compiling.engine import FEW_STEPS, MOST_SPARED
+from flownav.core.compiling.level import LEVELS, level
 from forking import nursery
 
 ROTATIONS = """
@@ -152,8 +153,8 @@ def test_lanes_are_vectorised():
         for lane in range(len(lanes)):
             p[lane] = scaled(p[lane])
 
-    scale(_work(LANES), LANES)
-    (code,) = scale.inspect_asm().values()
+    scale.dispatcher(_work(LANES), LANES)
+    (code,) = scale.dispatcher.inspect_asm().values()
     assert "vmulpd" in code
 
 
@@ -173,12 +174,12 @@ def rotations(tmp_path_factory):
         yield run
 
 
-@pytest.mark.parametrize("level", ["x86-64-v3", "host"])
-def test_every_level_gives_the_same_bits(level, rotations):
+@pytest.mark.parametrize("asked_level", ["x86-64-v3", "host"])
+def test_every_level_gives_the_same_bits(asked_level, rotations):
     """Contraction is off, so no processor level rounds differently; one that this machine has not is not tried."""
-    if level == "x86-64-v3" and target.level().name not in target.LEVELS:
+    if asked_level == "x86-64-v3" and level().name not in LEVELS:
         pytest.skip("this machine has no such level")
-    ours, theirs = (rotations(FLOWNAV_LEVEL=asked) for asked in (target.level().name, level))
+    ours, theirs = (rotations(FLOWNAV_LEVEL=asked) for asked in (level().name, asked_level))
     assert ours == theirs
     assert len(ours.split()) == 2
 

@@ -54,7 +54,8 @@ def test_an_index_is_not_wrapped():
     numbers = np.array([1, 2, 3])
     counted(numbers[1:], -1, 10)
     assert numbers.tolist() == [11, 2, 3]
-    (llvm,) = counted.inspect_llvm().values()
+    counted.dispatcher(numbers[1:], -1, 0)
+    (llvm,) = counted.dispatcher.inspect_llvm().values()
     body = re.search(r"define [^\n]*counted[^\n]*\{.*?\n\}", llvm, re.S)
     assert body is not None
     assert "select" not in body.group(0)

@@ -9,7 +9,7 @@ import pytest
 
 from flownav.core.compile import LANES, ONE_LANE, unit
 from flownav.core.compiling import target
-from flownav.core.compiling.engine import without_surprises
+from flownav.core.compiling.compiler import without_surprises
 
 SCALE = 3.0
 
@@ -88,7 +88,7 @@ def test_a_wrong_unit_does_not_change_how_the_others_are_compiled():
 
 
 def test_where_only_the_plain_way_works_it_is_kept_and_said(monkeypatch, capsys):
-    monkeypatch.setattr(target._Leanness, "wanted", True)
+    monkeypatch.setattr(target.Leanness, "wanted", True)
 
     def compile_it():
         if target.is_lean():

@@ -191,8 +191,8 @@ def test_a_loop_over_lanes_is_vectorised():
         for i in range(len(x)):
             out[i] = elementary_sin(x[i]) * elementary_exp(x[i]) + ARCTAN2(x[i], out[i])
 
-    turn(np.ones(64), np.ones(64))
-    (code,) = (made.library.get_llvm_str() for made in turn.overloads.values())
+    turn.dispatcher(np.ones(64), np.ones(64))
+    (code,) = (made.library.get_llvm_str() for made in turn.dispatcher.overloads.values())
     assert "fdiv <" in code.replace("fdiv fast", "fdiv")
     assert "@llvm.sin" not in code
 

@@ -17,6 +17,12 @@ class Record(NamedTuple):
     third: float
 
 
+class Defaulted(NamedTuple):
+    first: float
+    second: float = 2.5
+    third: float = float("nan")
+
+
 class Other(NamedTuple):
     first: float
     third: float
@@ -25,6 +31,7 @@ class Other(NamedTuple):
 load, store = lane_access(Record, 2)
 load_scattered, store_scattered = lane_access(Record, (7, 1, 5))
 load_told, store_told = lane_access(Record, None)
+_, store_defaulted = lane_access(Defaulted, (7, 1, 5))
 with_two = replacing(Record, "third", "first")
 
 
@@ -44,6 +51,12 @@ def turned(buffer, lanes, row):
 def turned_array(buffer, lanes):
     for lane in range(len(lanes)):
         store(buffer, lanes, lane, load_scattered(buffer, lanes, lane))
+
+
+@kernel
+def said_in_part(buffer, lanes):
+    for lane in range(len(lanes)):
+        store_defaulted(pointer(buffer), lanes, lane, Defaulted(1.5 + lane))
 
 
 @kernel
@@ -73,6 +86,15 @@ def test_what_is_no_flat_array_or_may_not_be_written_is_no_lane_buffer():
     for wrong in (np.zeros((12, 1)), np.zeros(24)[::2], np.zeros(12, np.float32), sealed):
         with pytest.raises(TypingError):
             turned_array(wrong, ONE_LANE)
+
+
+@pytest.mark.parametrize("lanes", [ONE_LANE, LANES])
+def test_fields_that_a_record_leaves_out_are_stored_by_their_defaults(lanes):
+    """As Python makes them; Numba's tuple has only what it was told, and that did not compile."""
+    compiled, plain = np.zeros(12 * len(lanes)), np.zeros(12 * len(lanes))
+    said_in_part(compiled, lanes)
+    said_in_part.py_func(plain, lanes)
+    np.testing.assert_array_equal(compiled, plain)
 
 
 def test_a_record_of_another_kind_is_not_stored():

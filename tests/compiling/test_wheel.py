@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+import build_wheel
 import compile_again
 from flownav.core.compiling import closure
 from places import PROJECT
@@ -74,6 +75,29 @@ def test_an_installed_library_is_one_wherever_it_lies():
     assert not closure.is_of_library("/home/user/project/law.py")
 
 
+def test_a_kernel_that_names_a_folder_of_this_machine_is_left_out_and_said(tmp_path, capsys):
+    kept, named = tmp_path / "kept.kernel", tmp_path / "named.kernel"
+    kept.write_bytes(b"machine code")
+    named.write_bytes(b"machine code, raised in " + os.fsencode(PROJECT / "src" / "law.py"))
+    assert [build_wheel.left_out(path, tmp_path) for path in (kept, named)] == [False, True]
+    assert capsys.readouterr().out == f"left out: named.kernel names {PROJECT}\n"
+
+
+# pages are drawn by the script that the wheel brings; what needs more says so in one line
+WITHOUT_EXTRAS = """
+from pathlib import Path
+import flownav
+from flownav.lab.optics.frame_files import read_frames
+from flownav.report import html, panels
+assert "plotly.js" in html.plotly_script()[:200]
+for lacking in (panels.plotly, lambda: read_frames([Path("frame.png")])):
+    try:
+        lacking()
+    except flownav.InputError as error:
+        print(error)
+"""
+
+
 # -- a wheel without kernels -------------------------------------------------------------------------------------
 @pytest.fixture(scope="module")
 def plain_wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -96,6 +120,7 @@ def test_everything_that_is_no_code_ships_too(plain_wheel):
         shipped = set(file.namelist())
     assert data <= shipped
     assert {"flownav/data/samples/flight.toml", "flownav/data/schemas/file-sensor.json", "flownav/py.typed"} <= shipped
+    assert {"flownav/report/vendor/plotly.min.js", "flownav/report/vendor/plotly.LICENSE"} <= shipped
     assert not any(name.startswith(("tests/", "docs/")) for name in shipped)
 
 
@@ -123,6 +148,14 @@ def test_the_wheel_works_in_an_empty_environment(plain_wheel, tmp_path):
         assert "flow and" in flownav("info", f"samples/{name}")
     left_out = json.loads(flownav("sample", "--json"))["notes"]
     assert left_out == ["tlog is left out: `pip install 'flownav[live]'` adds it"]
+    python = [str(place / "bin" / "python"), "-c"]
+    lacking = subprocess.run(
+        [*python, WITHOUT_EXTRAS], env=outside, cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert lacking.stdout.splitlines() == [
+        "plots in Python need the package plotly: pip install 'flownav[plots]'",
+        "pictures need Pillow: pip install 'flownav[pictures]'",
+    ]
 
 
 # -- the wheel itself --------------------------------------------------------------------------------------------
@@ -153,13 +186,15 @@ def flownav(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("level", ["", "x86-64-v3"])
-@pytest.mark.parametrize("more", [[], ["--filter", "paper"], ["--flights", "2"]], ids=["navigator", "paper", "flights"])
+@pytest.mark.parametrize(
+    "more", [["sortie"], ["landing"], ["landing", "--filter", "paper"], ["landing", "--flights", "2"]], ids="-".join
+)
 def test_an_installed_wheel_flies_without_compiling(flownav, tmp_path, level, more):
     environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "FLOWNAV_LEVEL")}
     environment |= {"FLOWNAV_CACHE": str(tmp_path / "cache")} | ({"FLOWNAV_LEVEL": level} if level else {})
-    command = [str(flownav), "fly", "landing", *more, "--no-report", "--json", "--out", str(tmp_path / "flight.fnr")]
+    command = [str(flownav), "fly", *more, "--no-report", "--json", "--out", str(tmp_path / "flight.fnr")]
     done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert json.loads(done.stdout)["scenario"] == "landing"
+    assert json.loads(done.stdout)["scenario"] == more[0]
     assert "compil" not in done.stderr
     assert not list((tmp_path / "cache").rglob("*.kernel"))
 

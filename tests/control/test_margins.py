@@ -7,10 +7,11 @@ from pathlib import Path
 import control as ct
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from flownav.control.design import gains_for
 from flownav.control.gains import AutopilotGains
-from flownav.control.loops import CUTS, LOOPS, Timing, loop_gains, period_map, spectral_radius
+from flownav.control.loops import CUTS, LOOPS, Timing, exponential, loop_gains, period_map, spectral_radius
 from flownav.control.margins import (
     LEAST_GAIN_DB,
     LEAST_PHASE_DEG,
@@ -211,3 +212,14 @@ def test_a_multirotor_keeps_its_margins_at_every_corner(name):
     assert not box.cannot_hover
     assert [(row.loop, row.corner, row.margins) for row in box.rows if short_of_margin(row)] == []
     assert len({row.corner for row in box.rows}) > 80
+
+
+@pytest.mark.parametrize("size", [1e-9, 0.02, 0.7, 30.0])
+def test_the_exponential_of_a_matrix_is_scipys(size):
+    matrix = size * np.random.default_rng(5).normal(size=(12, 12)) / np.sqrt(12)
+    known = expm(matrix)
+    np.testing.assert_allclose(exponential(matrix), known, rtol=1e-11, atol=1e-13 * np.abs(known).max())
+
+
+def test_the_exponential_of_nothing_is_one():
+    assert np.array_equal(exponential(np.zeros((3, 3))), np.eye(3))

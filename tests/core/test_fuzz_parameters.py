@@ -12,6 +12,7 @@ from pydantic import BaseModel
 
 from flownav.campaigns.requirement import load_requirement
 from flownav.campaigns.requirement import scenario_of as required
+from flownav.core.errors import InputError
 from flownav.core.parameter_files import load, shipped
 from flownav.lab.identification.rig_log import Rig
 from flownav.navigation.settings import NavigatorSettingsFile
@@ -110,3 +111,17 @@ def test_a_damaged_file_is_loaded_or_refused(tmp_path, name):
 def test_the_samples_themselves_are_loaded(tmp_path, name):
     (tmp_path / "x.toml").write_bytes(content_of(name))
     assert_finite(LOADERS[name](tmp_path / "x.toml"))
+
+
+@pytest.mark.parametrize(("name", "said", "instead", "words"), [
+    ("quad_450.toml", 'kind = "multirotor"', f"kind = 0x{'f' * 4000}", "kind = something that is too long"),
+    ("px4flow_paper.toml", "c_1_s2", "c_1_s2 = 1e-320 #", "greater than or equal to 0.001, got 1e-320"),
+])  # fmt: skip
+def test_what_damaged_files_found(tmp_path, name, said, instead, words):
+    """Seeds 400368 and 403252: a number of 4800 digits could not be told, and a delay of b/c was infinite."""
+    text = content_of(name).decode()
+    assert said in text
+    (tmp_path / "x.toml").write_text(text.replace(said, instead, 1))
+    with pytest.raises(InputError) as told:
+        LOADERS[name](tmp_path / "x.toml")
+    assert words in str(told.value)

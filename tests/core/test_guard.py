@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import socket
 import stat
@@ -13,6 +14,7 @@ from flownav.cli.output import place, record_place
 from flownav.core import guard
 from flownav.core.errors import InputError
 from flownav.core.guard import a_run, an_input, an_output, folder_written_whole, written_whole
+from flownav.core.marks import marked
 from flownav.core.parameter_files import read_toml
 from flownav.core.record import Record
 from flownav.lab.optics.frame_files import read_grey
@@ -124,7 +126,7 @@ def test_results_may_lie_in_the_folder_that_they_are_made_from(tmp_path):
 
 def test_what_a_run_has_read_it_does_not_replace_even_where_another_file_named_it(tmp_path):
     sheet = tmp_path / "sheet.toml"
-    sheet.write_text("# flownav\n")
+    sheet.write_bytes(marked("gain = 1\n"))
     with a_run():
         read_toml(sheet)
         with pytest.raises(InputError, match="would replace what it is made from"), written_whole(sheet):
@@ -207,8 +209,12 @@ def test_a_rig_log_is_replaced_only_where_its_setup_says_that_it_is_ours(tmp_pat
     (tmp_path / "rig.csv").write_text("t_s\n0\n")
     with pytest.raises(InputError, match=r"rig.csv: .* not written by flownav"):
         check_rig_folder(tmp_path)
-    (tmp_path / "rig.toml").write_text('flownav = "1"\n')
+    digest = hashlib.sha256(b"t_s\n0\n").hexdigest()
+    (tmp_path / "rig.toml").write_bytes(marked(f'rig_csv_sha256 = "{digest}"\n'))
     check_rig_folder(tmp_path)
+    (tmp_path / "rig.csv").write_text("t_s\n1\n")
+    with pytest.raises(InputError, match=r"rig.csv: .* not written by flownav"):
+        check_rig_folder(tmp_path)
     (tmp_path / "rig.toml").write_text("height_m = 1\n")
     with pytest.raises(InputError, match=r"rig.toml: .* not written by flownav"):
         check_rig_folder(tmp_path)

@@ -17,6 +17,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from command import run
 from flownav.core.errors import InputError
 from flownav.core.record import Record
 from flownav.core.record_file import ALWAYS_BYTES, MOST_BYTES, MOST_GROWTH, MOST_MANIFEST, _allowed
@@ -273,9 +274,9 @@ def test_a_small_file_that_would_become_a_large_one_is_refused_with_little_memor
 
 
 def test_a_text_that_repeats_is_read_once(tmp_path):
-    """A dictionary of one long word, 200 000 times: 2 GB where each has its own copy."""
-    words = pa.DictionaryArray.from_arrays(np.zeros(200_000, int), ["x" * 10_000])
-    table = parquet({"t_s": np.arange(200_000.0), "text": words}, compression="zstd", store_schema=False)
+    """A dictionary of one word, 150 000 times: 75 MB more where each has its own copy."""
+    words = pa.DictionaryArray.from_arrays(np.zeros(150_000, int), ["x" * 400])
+    table = parquet({"t_s": np.arange(150_000.0), "text": words}, compression="zstd", store_schema=False)
     path = bundle(tmp_path / "x.fnr", {"flags.parquet": table})
     done = subprocess.run(
         [sys.executable, "-c", LOAD, str(path)], capture_output=True, text=True, timeout=120, check=True
@@ -283,6 +284,16 @@ def test_a_text_that_repeats_is_read_once(tmp_path):
     said, peak_mb = done.stdout.splitlines()
     assert said == "read"
     assert int(peak_mb) < MOST_MB
+
+
+def test_a_long_text_that_repeats_is_refused_before_anybody_shows_it(tmp_path):
+    """A file of some kilobytes whose 1000 rows say 1.1 MB each would be a page of 1.1 GB."""
+    words = pa.DictionaryArray.from_arrays(np.zeros(1000, int), ["x" * 1_100_000])
+    table = parquet({"t_s": np.arange(1000.0), "text": words}, compression="zstd", store_schema=False)
+    assert "its texts are 1100000000 characters" in refusal(bundle(tmp_path / "x.fnr", {"flags.parquet": table}))
+    half = parquet({"t_s": np.arange(30.0), "text": ["x" * 1_100_000] * 30}, store_schema=False)
+    several = bundle(tmp_path / "y.fnr", {"flags.parquet": half, "flags2.parquet": half, "flags3.parquet": half})
+    assert "its texts are 33000000 characters" in refusal(several)
 
 
 def test_two_hours_at_a_kilohertz_are_within_the_limits():
@@ -385,3 +396,43 @@ def test_a_path_that_is_no_file_is_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "x.fnr")
     assert "a FIFO (a named pipe) is not read" in refusal(tmp_path / "x.fnr")
     assert "a device is not read" in refusal(Path("/dev/zero"))
+
+
+# -- times ---------------------------------------------------------------------------------------------------------
+def of_times(path, t_s, table="estimate"):
+    return bundle(path, {f"{table}.parquet": parquet({"t_s": np.asarray(t_s, float), "pos_n_m": np.zeros(len(t_s))})})
+
+
+@pytest.mark.parametrize(("t_s", "said"), [
+    ([0.0, 1.0, float("nan")], "table estimate: row 3 has the time nan s, which no clock shows"),
+    ([0.0, float("-inf")], "table estimate: row 2 has the time -inf s, which no clock shows"),
+    ([0.0, 1e12], "table estimate: row 2 has the time 1e+12 s, which no clock shows"),
+    ([0.0, 2.0, 1.0], "table estimate: row 3 is earlier than the row before it"),
+    ([0.0, 200_000.0], "it covers 0 to 200000 s, more than two days"),
+])  # fmt: skip
+def test_times_that_no_flight_has_are_refused(tmp_path, t_s, said):
+    assert said in refusal(of_times(tmp_path / "a.fnr", t_s))
+
+
+def test_tables_far_from_each_other_are_refused(tmp_path):
+    tables = {name: parquet({"t_s": T_S + at_s}) for name, at_s in (("truth.parquet", 0.0), ("events.parquet", 1e9))}
+    assert "more than two days" in refusal(bundle(tmp_path / "a.fnr", tables))
+
+
+def test_what_stands_as_it_came_need_not_be_in_order_and_a_clock_may_show_unix_seconds(tmp_path):
+    for table in ("fed", "events", "gps_position"):
+        t_s = [1.7e9 + 1.0, 1.7e9]
+        of_times(tmp_path / "a.fnr", t_s, table)
+        columns = {"source": ["a"] * 2, "kind": ["b"] * 2, "detail": ["c"] * 2} if table == "events" else {}
+        bundle(tmp_path / "a.fnr", {f"{table}.parquet": parquet({"t_s": t_s, **columns})})
+        assert Record.load(tmp_path / "a.fnr").tables[table]["t_s"].tolist() == t_s
+    assert len(Record.load(of_times(tmp_path / "a.fnr", [])).tables["estimate"]["t_s"]) == 0
+
+
+@pytest.mark.parametrize("command", [["report"], ["export", "--to", "mcap"], ["export", "--to", "kml"]])
+def test_commands_say_so_in_one_line(tmp_path, command):
+    path = of_times(tmp_path / "a.fnr", [0.0, 1.0, float("nan")])
+    done = run(command[0], path, *command[1:])
+    assert done.returncode == 2
+    assert "row 3 has the time nan s" in done.stderr
+    assert len(done.stderr.splitlines()) == 1

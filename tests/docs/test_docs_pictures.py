@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import ast
+import re
+
 import matplotlib.pyplot as plt
 import pytest
-from drawing import Picture, save
 
+import flownav
 from docs_tools import pictures, readme_picture
 from places import DOCS, PROJECT
 
-MADE_OTHERWISE = {"certificate", "landing", "rerun"}  # photographs of pages and of a viewer
+MADE_OTHERWISE = {"certificate", "rerun"}  # photographs of pages and of a viewer
 
 
 @pytest.mark.parametrize("picture", pictures.PICTURES, ids=lambda picture: picture.name)
@@ -36,9 +39,9 @@ def test_a_picture_is_drawn_the_same_each_time(tmp_path):
         axis.plot([1, 2])
         return figure
 
-    first = save(Picture("line", "", "A line.", line), tmp_path).read_bytes()
+    first = pictures.save(pictures.Picture("line", "", "A line.", line), tmp_path).read_bytes()
     assert first.startswith(b"\x89PNG")
-    assert save(Picture("line", "", "A line.", line), tmp_path).read_bytes() == first
+    assert pictures.save(pictures.Picture("line", "", "A line.", line), tmp_path).read_bytes() == first
     assert b"Software" not in first
 
 
@@ -46,6 +49,21 @@ def test_the_readmes_picture_is_of_the_command_that_it_names():
     command = readme_picture.command()
     assert command[0] == "fly"
     assert f"`flownav {' '.join(command)}`" in (PROJECT / "README.md").read_text(encoding="utf-8")
+    picture = (DOCS / "pictures" / "landing.svg").read_text(encoding="utf-8")
+    assert f"of {command[command.index('--flights') + 1]} flights" in picture
+    for page in (PROJECT / "README.md", DOCS / "index.md"):
+        assert "pictures/landing.svg)" in page.read_text(encoding="utf-8")
+
+
+def test_the_front_page_is_a_sentence_an_install_ten_lines_of_python_and_the_picture():
+    page = (DOCS / "index.md").read_text(encoding="utf-8")
+    code = re.findall(r"```python\n(.*?)```", page, re.S)[0]
+    assert len(code.strip().splitlines()) == 10
+    names = [node for node in ast.walk(ast.parse(code)) if isinstance(node, ast.Attribute)]
+    asked = {name.attr for name in names if isinstance(name.value, ast.Name) and name.value.id == "flownav"}
+    assert asked <= set(flownav.__all__)
+    places = [page.index(part) for part in ("pip install", "```python", "pictures/landing.svg", "## ")]
+    assert places == sorted(places)
 
 
 def test_gallery_shows_every_picture():

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from filters import Filter, N, filter_at, random_covariance
 from flownav.core.compile import LANES, ONE_LANE
-from flownav.estimation.consistency import pack, unpack
 from flownav.estimation.covariance import consider, consider_none, correct, fuse
 from flownav.estimation.states import (
     ACCEPTED,
@@ -38,6 +37,7 @@ from flownav.navigation.flow import consider_others
 from flownav.navigation.memory import HEADING_SOUGHT, new_work
 from flownav.navigation.take import consider_datum
 from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
+from packed_covariance import pack, unpack
 
 SEEDS = st.integers(0, 2**32 - 1)
 HEADING = ATTITUDE + 2

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
@@ -10,8 +12,8 @@ from hypothesis import strategies as st
 
 from filters import Filter, N, cross_matrix, filter_at, random_covariance
 from flownav.core.compile import LANES, ONE_LANE
-from flownav.estimation.consistency import pack, unpack
 from flownav.estimation.covariance import (
+    HUBER_SIGMAS,
     add_noise,
     add_noise_lane,
     at,
@@ -47,8 +49,10 @@ from flownav.estimation.states import (
     STATES_WITH_LAG,
     TEST_RATIO,
     VECTORS,
+    VELOCITY,
     fold_attitude,
 )
+from packed_covariance import pack, unpack
 from places import DOCS
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -152,6 +156,11 @@ def joseph(p: np.ndarray, h: np.ndarray, gain: np.ndarray, noise: float) -> np.n
     return left @ p @ left.T + noise * np.outer(gain, gain)
 
 
+def robust(gain: np.ndarray, nu: float, variance: float) -> np.ndarray:
+    """The gain of an innovation that counts as no more than HUBER_SIGMAS."""
+    return gain * min(1.0, HUBER_SIGMAS / (abs(nu) / math.sqrt(variance)))
+
+
 @settings(max_examples=25, deadline=None)
 @given(SEEDS, st.integers(1, 12), st.floats(1e-6, 1e3))
 def test_a_correction_is_josephs_dense_form(seed, terms, noise):
@@ -160,7 +169,7 @@ def test_a_correction_is_josephs_dense_form(seed, terms, noise):
     ours.observe(some_states(random, terms), random.normal(size=terms))
     h, x, p, nu = ours.jacobian, ours.x.copy(), ours.p, random.normal()
     variance = h @ p @ h + noise
-    gain = p @ h / variance
+    gain = robust(p @ h / variance, nu, variance)
     ours.offer(nu, noise)
     assert ours.fuse()
     assert ours.work[INNOVATION_VARIANCE] == pytest.approx(variance, rel=1e-12)
@@ -202,7 +211,7 @@ def test_a_small_filter_leaves_the_states_that_it_has_not():
 
 
 def test_sixty_steps_match_filterpy():
-    """Gauss-Markov steps and corrections in turn, with state and covariance beside FilterPy's."""
+    """Gauss-Markov steps and corrections in turn, with state and covariance beside FilterPy's: within HUBER_SIGMAS."""
     random = np.random.default_rng(11)
     ours = filter_with_covariance(random)
     theirs = KalmanFilter(dim_x=N, dim_z=1)
@@ -216,12 +225,29 @@ def test_sixty_steps_match_filterpy():
         add_noise(ours.work, ONE_LANE, state, 0.19)
         ours.observe(some_states(random, 4), random.normal(size=4))
         h, noise, nu = ours.jacobian, random.uniform(0.01, 4.0), random.normal()
+        nu = np.clip(nu, -math.sqrt(noise), math.sqrt(noise))  # S is larger than R: within one sigma
         theirs.update(h @ theirs.x + nu, R=noise, H=h[None, :])
         ours.offer(nu, noise)
         assert ours.fuse()
         theirs.x[ATTITUDE : ATTITUDE + 3] = 0.0  # folded into the quaternion
     assert np.allclose(ours.x, theirs.x[:, 0], rtol=0, atol=1e-10)
     assert np.allclose(ours.p, theirs.P, rtol=0, atol=1e-10)
+
+
+def test_an_innovation_counts_as_no_more_than_two_sigma_and_tells_less_of_the_covariance():
+    """Twice as far moves the state no further, and leaves it less sure than a reading that fits."""
+    moved, left = [], []
+    for sigmas in (1.0, 2.0, 3.0, 4.5):
+        ours = filter_with_covariance(np.random.default_rng(6))
+        ours.observe([VELOCITY], [1.0])
+        before = ours.x[VELOCITY]
+        ours.offer(sigmas * math.sqrt(ours.p[VELOCITY, VELOCITY] + 0.3), 0.3)
+        assert ours.fuse()
+        moved.append(ours.x[VELOCITY] - before)
+        left.append(ours.p[VELOCITY, VELOCITY])
+    assert moved[1:] == pytest.approx([2.0 * moved[0]] * 3)
+    assert left[0] == pytest.approx(left[1])
+    assert left[1] < left[2] < left[3]
 
 
 # -- what is refused ---------------------------------------------------------------------------------------------

@@ -9,7 +9,6 @@ import landing_loop
 from filters import KEPT, SETTINGS, Filter, N, filter_at, paper_lag, random_covariance
 from flownav.core.compile import LANES, ONE_LANE, kernel, pointer
 from flownav.core.frames import GRAVITY_M_S2
-from flownav.estimation.consistency import unpack
 from flownav.estimation.covariance import (
     add_noise_lane,
     at,
@@ -51,6 +50,7 @@ from flownav.estimation.states import (
     TEST_RATIO,
 )
 from landing_loop import ARRIVED, ATTITUDE_READ, POSITION_READ, RANGE_READ, ROWS, STEP_S
+from packed_covariance import unpack
 
 WIDE = len(LANES)
 NUMBERS = SETTINGS._replace(gate_sigma=1e6)  # everything is fused, whatever it says

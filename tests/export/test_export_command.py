@@ -30,6 +30,7 @@ NAMES = {
 @pytest.fixture
 def record(tmp_path):
     located = awkward()
+    located.tables["estimate"]["t_s"].sort()  # a file out of order is refused
     located.manifest["parameters"] = {"origin_lat_lon_deg_alt_m": [47.4, 8.5, 488.0]}
     located.save(tmp_path / "run.fnr")
     return tmp_path / "run.fnr"

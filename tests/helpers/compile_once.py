@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from flownav.core.compiling import beside
-from flownav.core.compiling.cache import KernelCache, cache_folder
+from flownav.core.compiling.cache import SUFFIX, Store, cache_folder
 
 HUNG_S = 900.0  # whoever compiles for so long hangs, and is not waited for any more
 
@@ -51,20 +51,20 @@ class Turns:
 def begin() -> None:
     """From now on, this process compiles nothing that another one is compiling."""
     turns = Turns()
-    load, save = KernelCache.load_overload, KernelCache.save_overload
+    load, save = Store.load, Store.save
     are_missing, compiling = beside._are_both_missing, beside._compiling_elsewhere
 
-    def load_or_wait(self: KernelCache, sig: Any, context: Any) -> Any:
-        found, name = load(self, sig, context), self.file_name(sig)
-        if found is None and name is not None and turns.take(name):
-            found = load(self, sig, context)
+    def load_or_wait(self: Store, name: str) -> bytes | None:
+        found = load(self, name)
+        if found is None and name.endswith(SUFFIX) and turns.take(name):
+            found = load(self, name)
             if found is not None:
                 turns.give(name)
         return found
 
-    def save_and_give(self: KernelCache, sig: Any, data: Any) -> None:
-        save(self, sig, data)
-        turns.give(self.file_name(sig) or "")
+    def save_and_give(self: Store, name: str, payload: bytes) -> None:
+        save(self, name, payload)
+        turns.give(name)
 
     def are_missing_still(*asked: Any) -> bool:
         if not are_missing(*asked) or not beside.can_pay():
@@ -83,5 +83,5 @@ def begin() -> None:
         finally:
             turns.give("beside")
 
-    KernelCache.load_overload, KernelCache.save_overload = load_or_wait, save_and_give
+    Store.load, Store.save = load_or_wait, save_and_give
     beside._are_both_missing, beside._compiling_elsewhere = are_missing_still, compiling_and_give

@@ -82,3 +82,50 @@ def deck_log(tables: dict[str, dict[str, np.ndarray]], version: int = 2, boot_s:
         log.add("estPosition", [f"locSrv.{axis}(f)" for axis in "xyz"], truth["t_s"] + boot_s,
                 truth["n"], -truth["e"], -truth["d"])  # fmt: skip
     return log
+
+
+# -- the logger of the estimator's events ----------------------------------------------------------------------
+FOUND = {  # dataset_config.txt of utiasDSL/util-uwb-dataset: each event's payload, then what it names
+    "estTDOA": ["idA(B)", "idB(B)", "distanceDiff(f)"],
+    "estPosition": ["source(B)", *(f"{group}.{axis}(f)" for group in ("locSrv", "lighthouse") for axis in "xyz")],
+    "estPose": [f"locSrv.{name}(f)" for name in ("x", "y", "z", "qx", "qy", "qz", "qw")],
+    "estDistance": ["id(B)", "distance(f)"],
+    "estTOF": ["range.zrange(H)"],
+    "estAbsoluteHeight": [],
+    "estFlow": ["motion.deltaX(h)", "motion.deltaY(h)"],
+    "estYawError": ["yawError(f)"],
+    "estSweepAngle": ["sensorId(B)", "baseStationId(B)", "sweepId(B)", "t(f)", "sweepAngle(f)"],
+    "estGyroscope": [f"gyro.{axis}(f)" for axis in "xyz"],
+    "estAcceleration": [f"acc.{axis}(f)" for axis in "xyz"],
+    "estBarometer": ["baro.asl(f)"],
+}
+
+
+def event_log(tables: dict[str, dict[str, np.ndarray]], pose: dict[str, np.ndarray] | None = None, *,
+              version: int = 2, boot_s: float = 30.0, lost: float = 0.0, seed: int = 1) -> DeckLog:  # fmt: skip
+    """The tables of `quantised` as the estimator's events write them (src/modules/src/estimator/estimator.c).
+
+    Gyro and accelerometer apart by some microseconds, the barometer at the gyro's rate with its last value, flow only
+    where a read saw motion. pose: t_s, n, e, d and the quaternion qw ... qz of FRD to NED. lost: the share of blocks
+    for which the deck's buffer had no room.
+    """
+    imu, flow, sign = tables["imu"], tables["flow"], {"x": 1.0, "y": -1.0, "z": -1.0}
+    counts = {axis: np.rint(flow[f"flow_{axis}_rad_s"] * READ_EVERY_S / RAD_PER_COUNT) for axis in "xy"}
+    moved = (counts["x"] != 0) | (counts["y"] != 0)
+    last = np.maximum(np.searchsorted(tables["baro"]["t_s"], imu["t_s"], side="right") - 1, 0)
+    rows = {
+        "estGyroscope": (imu["t_s"], *(np.degrees(sign[axis] * imu[f"gyro_{axis}_rad_s"]) for axis in "xyz")),
+        "estAcceleration": (imu["t_s"] + 60e-6, *(sign[axis] * imu[f"accel_{axis}_m_s2"] / GRAVITY for axis in "xyz")),
+        "estBarometer": (imu["t_s"] + 90e-6, tables["baro"]["alt_m"][last]),
+        "estTOF": (tables["range"]["t_s"], 1e3 * tables["range"]["range_m"]),
+        "estFlow": (flow["t_s"][moved], -counts["x"][moved], -counts["y"][moved]),
+    }
+    if pose is not None:
+        rows["estPose"] = (pose["t_s"], pose["n"], -pose["e"], -pose["d"],
+                           pose["qx"], -pose["qy"], -pose["qz"], pose["qw"])  # fmt: skip
+    log, draw = DeckLog(version), np.random.default_rng(seed)
+    for name, variables in FOUND.items():
+        t_s, *columns = rows.get(name, (np.zeros(0), *(np.zeros(0) for _ in variables)))
+        kept = draw.random(len(t_s)) >= lost
+        log.add(name, variables, t_s[kept] + boot_s, *(column[kept] for column in columns))
+    return log

@@ -87,7 +87,7 @@ def host_engine(modules: list[str]) -> Any:
     options = llvm.create_pipeline_tuning_options(speed_level=2)
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(whole, builder)
-    engine = llvm.create_mcjit_compiler(whole, machine)
+    engine = llvm.create_mcjit_compiler(whole, machine, use_lmm=True)
     engine.finalize_object()
     return engine
 

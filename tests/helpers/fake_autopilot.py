@@ -16,6 +16,7 @@ from flownav.logs.mavlink.signing import sign_outgoing
 ARDUPILOT, PX4 = 3, 12
 INT8, INT32, REAL32 = 2, 6, 9
 ARMED = 128
+REQUEST, RUN_CHECKS = 512, 401  # MAV_CMD
 
 
 def kind_of(number: float, make: int) -> int:
@@ -30,7 +31,8 @@ class FakeAutopilot:
     """parameters: as written in a table, an int is of an integer type. loss: share of frames lost, each way.
 
     stubborn: parameters that keep their value whatever is set. gimbal: a component that answers for itself, with
-    values of its own.
+    values of its own. origin: of its EKF, as it tells it (1e-7 deg, 1e-7 deg, mm); takes_origin: whether it lets it be
+    set. says: its texts when its checks are run.
     """
 
     make: int
@@ -41,6 +43,9 @@ class FakeAutopilot:
     gimbal: bool = False
     tells_unknown: bool = False
     stubborn: tuple[str, ...] = ()
+    origin: tuple[int, int, int] | None = None
+    takes_origin: bool = True
+    says: tuple[str, ...] = ()
     key: bytes | None = None
     counts: Counter[str] = field(default_factory=Counter)
     noise: random.Random = field(default_factory=lambda: random.Random(7))
@@ -65,6 +70,12 @@ class FakeAutopilot:
             self.counts[message.msgname] += 1
             if message.msgname in ("PARAM_REQUEST_READ", "PARAM_SET") and not self.deaf:
                 answers += self._answer(message)
+            elif message.msgname == "SET_GPS_GLOBAL_ORIGIN" and self.takes_origin:
+                self.origin = message.latitude, message.longitude, message.altitude
+            elif message.msgname == "COMMAND_LONG" and message.command == REQUEST and self.origin is not None:
+                answers.append(bytes(self.mav.gps_global_origin_encode(*self.origin).pack(self.mav)))
+            elif message.msgname == "COMMAND_LONG" and message.command == RUN_CHECKS:
+                answers += [bytes(self.mav.statustext_encode(2, text.encode()).pack(self.mav)) for text in self.says]
         return [answer for answer in answers if self.noise.random() >= self.loss]
 
     def _answer(self, message: Any) -> list[bytes]:

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from flownav.core.compile import ONE_LANE
 from flownav.core.frames import quaternion_from_euler
-from flownav.estimation.consistency import pack, unpack
 from flownav.estimation.covariance import fuse
 from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.lag import FlowLag
@@ -47,6 +46,7 @@ from flownav.estimation.states import (
     VELOCITY_LAG,
 )
 from flownav.sensors.processes import second_order_hold
+from packed_covariance import pack, unpack
 
 N = STATES_WITH_LAG
 ELEMENTS = N * (N + 1) // 2

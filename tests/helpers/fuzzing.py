@@ -12,8 +12,8 @@ import numpy as np
 
 from flownav.core.errors import InputError
 from flownav.core.measurement import COLUMNS, Sensor
+from flownav.core.record import LATEST_S, LONGEST_S
 from flownav.logs.log import Log
-from flownav.logs.plausible import LATEST_S, LONGEST_LOG_S
 
 MUTANTS = int(os.environ.get("FLOWNAV_FUZZ", "200"))  # a sample; `make fuzz` asks for a hundred times as many
 FIRST_SEED = int(os.environ.get("FLOWNAV_FUZZ_FIRST", "0"))
@@ -48,7 +48,7 @@ def assert_sound(log: Log, most: Mapping[Sensor, float] = MOST, longer: float = 
         if sensor == Sensor.ATTITUDE:
             assert np.allclose(np.linalg.norm(stream.value, axis=1), 1.0, rtol=0.0, atol=longer)
     start, end = log.span_s if any(map(len, log.streams.values())) else (0.0, 0.0)
-    assert end - start <= LONGEST_LOG_S
+    assert end - start <= LONGEST_S
     for table in (log.truth, log.autopilot):
         if table is not None:
             assert len({len(column) for column in table.values()}) == 1
@@ -61,7 +61,7 @@ def assert_times(t_s: np.ndarray) -> None:
     """Finite seconds of one clock, in order, of two days at most."""
     assert np.all(np.isfinite(t_s))
     assert np.all(np.diff(t_s) >= 0.0)
-    assert not len(t_s) or (t_s[-1] - t_s[0] <= LONGEST_LOG_S and max(-t_s[0], t_s[-1]) < LATEST_S)
+    assert not len(t_s) or (t_s[-1] - t_s[0] <= LONGEST_S and max(-t_s[0], t_s[-1]) < LATEST_S)
 
 
 def peak_bytes(anew: bool = False) -> int:

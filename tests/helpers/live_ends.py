@@ -49,6 +49,7 @@ class Hover:
     north_m: float = 0.0  # by so much GPS is off
     noise: random.Random = field(default_factory=lambda: random.Random(4))
     steps: int = 0
+    answers: bool = False  # TIMESYNC
 
     def __post_init__(self) -> None:
         self.mav: Any = coder(self.system, 1)
@@ -93,6 +94,9 @@ class Datagrams:
         self._waiting: deque[tuple[bytes, Any]] = deque()
         net[self._address] = self
 
+    def getsockopt(self, *_: int) -> bytes:
+        return bytes(36)  # nothing was lost
+
     def getsockname(self) -> Any:
         return self._address
 
@@ -119,8 +123,11 @@ class Datagrams:
 class Wire:
     """A session behind a UDP link, and a vehicle's socket. `heard` are the messages that the vehicle received."""
 
-    def __init__(self, vehicle: Hover, options: Options | None = None, keeper: Any = None) -> None:
+    def __init__(
+        self, vehicle: Hover, options: Options | None = None, keeper: Any = None, reads_bytes_s: float = math.inf
+    ) -> None:
         self.vehicle, self.t_s = vehicle, 0.0
+        self.reads_bytes_s, self._unread = reads_bytes_s, 0.0
         self.session = Session(options or Options(), keeper or Keeper(), START_S, UNIX_S)
         link = open_link("udp:0")
         assert isinstance(link, UdpLink)
@@ -132,6 +139,7 @@ class Wire:
         self.heard: list[Any] = []
         self.heard_s: list[float] = []
         self.frames: list[bytes] = []
+        self.turns = 0
         self.last: tuple[bytes, ...] = ()
         self._coder = coder()
 
@@ -151,21 +159,36 @@ class Wire:
 
     def pump(self) -> None:
         """The session's turn, as the loop gives it."""
-        while pieces := self.link.read():
+        while True:
+            if self.session.turns > self.turns:
+                self.turns = self.session.turns
+                self.link.forget()
+            pieces, strange = self.link.read(), self.link.overheard()
             for piece, sender in pieces:
                 if self.session.take(piece, self.now_s, whole=True):
                     self.link.believe(sender)
+            for piece in strange:
+                self.session.overhear(piece)
+            if not pieces and not strange:
+                break
         self.session.tick(self.now_s)
         while self.session.outbox:
             self.link.write(self.session.outbox.popleft())
-        while True:
+        self._unread = min(self._unread + self.reads_bytes_s * STEP_S, 0.0 + max(self.reads_bytes_s, 1.0))
+        while self._unread > 0.0:
             try:
                 frame = self.socket.recv(4096)
             except BlockingIOError:
                 return
+            self._unread -= len(frame)
             self.frames.append(frame)
             self.heard.append(self._coder.decode(bytearray(frame)))
             self.heard_s.append(self.t_s)
+            if self.vehicle.answers and self.heard[-1].msgname == "TIMESYNC" and not self.heard[-1].tc1:
+                reply = say.timesync_reply(
+                    self.vehicle.mav, self.heard[-1], round((self.vehicle.boot_s + self.t_s) * 1e9)
+                )
+                self.socket.send(bytes(reply.pack(self.vehicle.mav)))
 
     def fly(self, seconds: float, *, silent: bool = False, beside: Any = None) -> Wire:
         """Time passes; the vehicle talks, unless it is silent. `beside` is called at each step."""

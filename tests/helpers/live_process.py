@@ -6,10 +6,12 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from flownav.live.byte_links import open_link
+from flownav.logs.mavlink.framing import coder
 from live_ends import Hover
 
 ODOMETRY = 331
@@ -33,6 +35,8 @@ class LiveProcess:
         self.process = subprocess.Popen(command, **(usual | popen))
         self.vehicle, self.link = Hover(), open_link(f"udpout:127.0.0.1:{port}")
         self.told = 0
+        self.heard: list[tuple[float, Any]] = []  # how old each estimate was when it came [s], and what it says
+        self._hears = coder()
         self._start_s = time.monotonic()
 
     def __enter__(self) -> LiveProcess:
@@ -43,8 +47,8 @@ class LiveProcess:
         self.process.wait()
         self.link.close()
 
-    def fly(self, more: int, within_s: float = HUNG_S) -> LiveProcess:
-        """Talk until so many more estimates have come back."""
+    def fly(self, more: int, within_s: float = HUNG_S, beside: Callable[[], object] = lambda: None) -> LiveProcess:
+        """Talk until so many more estimates have come back; beside: called every 10 ms."""
         until_s, wanted = time.monotonic() + within_s, self.told + more
         while self.told < wanted:
             assert time.monotonic() < until_s, f"{self.told} of {wanted} estimates after {within_s} s"
@@ -52,8 +56,13 @@ class LiveProcess:
             time.sleep(0.01)
             for frame in self.vehicle.frames(time.monotonic() - self._start_s):
                 self.link.write(frame)
+            beside()
             for piece, _ in self.link.read():
-                self.told += piece[0] == 0xFD and int.from_bytes(piece[7:10], "little") == ODOMETRY
+                if piece[0] == 0xFD and int.from_bytes(piece[7:10], "little") == ODOMETRY:
+                    self.told += 1
+                    said: Any = self._hears.decode(bytearray(piece))
+                    now_s = self.vehicle.boot_s + time.monotonic() - self._start_s
+                    self.heard.append((now_s - 1e-6 * said.time_usec, said))
         return self
 
     def end(self, number: int) -> tuple[str, str]:

@@ -6,7 +6,6 @@ import dis
 import importlib
 import inspect
 import math
-import pickle
 import struct
 from collections.abc import Iterator
 from itertools import pairwise
@@ -15,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from flownav.core.compiling.cache import STORE
 from flownav.core.compiling.closure import PACKAGE
 from flownav.core.compiling.engine import EQUATIONS, Kernel
+from flownav.core.compiling.loaded import kept
 from flownav.core.compiling.units import Unit
 
 SYMBOL_TABLE, SECTION_BYTES, SYMBOL_BYTES = 2, 64, 24
@@ -62,13 +61,8 @@ def parts() -> dict[int, Any]:
 
 def codes(part: Any) -> Iterator[bytes]:
     """The machine code of a kernel, for each type of arguments that it was used with, or of a unit that was used."""
-    if isinstance(part, Kernel):
-        keeper, kinds = part._cache, list(part.overloads)
-    else:
-        keeper, kinds = part._keeper, [part._signature] if part.is_ready else []
-    for kind in kinds:
-        _, _, code, _ = pickle.loads(STORE.load(keeper.file_name(kind)))[0]
-        yield code
+    names = part.files() if isinstance(part, Kernel) else [part.file_name()] if part.is_ready else []
+    yield from (kept(name).code for name in names)
 
 
 def compiled_functions() -> set[FunctionType]:

@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 from flownav.live.filtering import Keeper
 from flownav.live.options import Options
 from flownav.live.session import Session
-from flownav.logs.mavlink.framing import StreamFrames, coder
+from flownav.logs.mavlink.framing import coder
 
+TIMESYNC = bytes([111, 0, 0])
 TICK_S = 0.005  # as the loop wakes up
 
 
@@ -34,13 +35,13 @@ class Sent(NamedTuple):
 
 
 def frames_of(path: Path) -> Iterator[tuple[float, bytes]]:
-    """UNIX time of arrival [s] and frame of a .tlog."""
+    """UNIX time of arrival [s] and frame of a .tlog of MAVLink 2, those that nobody knows among them."""
     data, place = path.read_bytes(), 0
     while place + 20 <= len(data):
         (stamp_us,) = struct.unpack_from(">Q", data, place)
-        [(_, frame)] = StreamFrames().feed(data[place + 8 : place + 8 + data[place + 9] + 25], whole=True) or [(0, b"")]
-        yield stamp_us * 1e-6, frame
-        place += 8 + len(frame)
+        size = data[place + 9] + 12 + (13 if data[place + 10] & 1 else 0)
+        yield stamp_us * 1e-6, data[place + 8 : place + 8 + size]
+        place += 8 + size
 
 
 def arrivals(folder: Path, until_s: float = float("inf")) -> list[Arrival]:
@@ -49,7 +50,7 @@ def arrivals(folder: Path, until_s: float = float("inf")) -> list[Arrival]:
     said = (
         stamp_s - message.ts1 * 1e-9
         for stamp_s, frame in frames_of(folder / "from_flownav.tlog")
-        if (message := decoder.decode(bytearray(frame))).msgname == "TIMESYNC" and not message.tc1
+        if frame[7:10] == TIMESYNC and not (message := decoder.decode(bytearray(frame))).tc1
     )
     ahead_s = next(said)
     found: list[Arrival] = []

@@ -38,6 +38,8 @@ def rows_touching(distance_m: np.ndarray, crashed: np.ndarray | None = None) -> 
 class StandIn:
     """An engine whose flights are numbers: outcome(cell, seed, first, flights), how far off the pad each touches."""
 
+    piece = 256
+
     def __init__(self, outcome: Callable[[Ready, int, int, int], np.ndarray]) -> None:
         self.outcome, self.flown = outcome, 0
 

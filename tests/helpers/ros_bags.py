@@ -5,6 +5,7 @@ Written apart from the package's reader on purpose: axes are turned here by hand
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+ROS_1_KINDS = ("sensor_msgs/msg/Imu", "sensor_msgs/msg/NavSatFix", "sensor_msgs/msg/Range")
 START_NS = 1_760_000_000_000_000_000
 FLOW_RAD = """std_msgs/Header header
 uint32 integration_time_us
@@ -24,6 +26,15 @@ int16 temperature
 uint8 quality
 uint32 time_delta_distance_us
 float32 distance
+"""
+TARGET = """std_msgs/Header header
+uint8 coordinate_frame
+uint16 type_mask
+geometry_msgs/Point position
+geometry_msgs/Vector3 velocity
+geometry_msgs/Vector3 acceleration_or_force
+float32 yaw
+float32 yaw_rate
 """
 PX4 = {
     "SensorCombined": "uint64 timestamp\nfloat32[3] gyro_rad\nuint32 gyro_integral_dt\n"
@@ -43,6 +54,7 @@ PX4 = {
 def typestore() -> Any:
     store = get_typestore(Stores.ROS2_HUMBLE)
     store.register(get_types_from_msg(FLOW_RAD, "mavros_msgs/msg/OpticalFlowRad"))
+    store.register(get_types_from_msg(TARGET, "mavros_msgs/msg/PositionTarget"))
     for name, words in PX4.items():
         store.register(get_types_from_msg(words, f"px4_msgs/msg/{name}"))
     return store
@@ -80,6 +92,23 @@ class BagMaker:
                     connections[topic] = writer.add_connection(topic, kind, typestore=self.store)
                 writer.write(connections[topic], ns, self.store.serialize_cdr(message, kind))
         return folder
+
+    def write_ros_1(self, path: Path, kinds: Collection[str] = ROS_1_KINDS) -> Path:
+        """The messages of kinds that ROS 1 has, as its bag."""
+        from rosbags.rosbag1 import Writer as Writer1
+
+        store = get_typestore(Stores.ROS1_NOETIC)
+        with Writer1(path) as writer:
+            connections: dict[str, Any] = {}
+            for ns, topic, kind, message in sorted(self.rows, key=lambda row: row[0]):
+                if kind in kinds:
+                    if topic not in connections:
+                        connections[topic] = writer.add_connection(topic, kind, typestore=store)
+                    message.header = store.types["std_msgs/msg/Header"](
+                        seq=0, stamp=message.header.stamp, frame_id="base_link"
+                    )
+                    writer.write(connections[topic], ns, store.serialize_ros1(message, kind))
+        return path
 
 
 def enu_quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from replay_logs import log_of_flight, write_table
+from replay_logs import SyntheticLog, log_of_flight, path, write_table
 
 IMU_HZ = 50.0
 
@@ -42,7 +42,38 @@ def noisy_flight(
         del tables["gps"]
     written = flown.write(folder)
     if truth:
-        t_s = np.arange(0.0, duration_s - 0.5, 0.02)
-        north, east, down = (np.interp(t_s, flown.t_s, column) for column in flown.position.T)
-        write_table(written / "truth.csv", {"t_s": t_s, "x_m": north, "y_m": east, "z_m": down})
+        _write_truth(flown, written, duration_s)
     return written
+
+
+def flight_in_mid_air(
+    folder: Path, *, seed: int, duration_s: float = 45.0, gyro_bias: float = 0.0005, accel_bias: float = 0.05
+) -> Path:
+    """A log that begins in flight, on a part of the path that its seed draws: IMU, flow, range and truth.
+
+    Noise is that of the shipped settings; gyro_bias [rad/s] and accel_bias [m/s2] are standard deviations of constants.
+    """
+    draw = np.random.default_rng(seed)
+    begin = draw.uniform(10.0, 50.0)
+    there = path(np.array([begin])) * (1.0, 1.0, 0.0)
+    flown = log_of_flight(duration_s, imu_hz=IMU_HZ, along=lambda t_s: path(t_s + begin) - there)
+    flown.tables = {name: flown.tables[name] for name in ("imu", "flow", "range")}
+
+    def disturb(table: str, start: str, sigma: float, bias: float = 0.0) -> None:
+        for column in [column for column in flown.tables[table] if column.startswith(start)]:
+            noise = sigma * draw.standard_normal(len(flown.tables[table]["t_s"]))
+            flown.tables[table][column] = flown.tables[table][column] + bias * draw.standard_normal() + noise
+
+    disturb("imu", "gyro_", 0.004 * IMU_HZ**0.5, gyro_bias)
+    disturb("imu", "accel_", 0.05 * IMU_HZ**0.5, accel_bias)
+    disturb("flow", "flow_", 0.05)
+    disturb("range", "range_m", 0.05)
+    written = flown.write(folder)
+    _write_truth(flown, written, duration_s)
+    return written
+
+
+def _write_truth(flown: SyntheticLog, folder: Path, duration_s: float) -> None:
+    t_s = np.arange(0.0, duration_s - 0.5, 0.02)
+    north, east, down = (np.interp(t_s, flown.t_s, column) for column in flown.position.T)
+    write_table(folder / "truth.csv", {"t_s": t_s, "x_m": north, "y_m": east, "z_m": down})

@@ -16,7 +16,7 @@ from scipy import signal
 from flownav.core.errors import InputError
 from flownav.core.provenance import hash_of
 from flownav.core.text import to_toml
-from flownav.lab.identification.autopilot_parameters import parameters, write_parameters
+from flownav.lab.identification.autopilot_parameters import left_out, parameters, write_parameters
 from flownav.lab.identification.descent import Structure
 from flownav.lab.identification.findings import Findings
 from flownav.lab.identification.first_look import judge
@@ -286,6 +286,49 @@ def test_a_gain_that_may_be_one_is_left_alone(found):
     response = found.responses[0]
     same = replace(found, responses=(replace(response, gain=response.gain._replace(value=1.01, low=0.97, high=1.05)),))
     assert by_name("ardupilot", same)["FLOW_FYSCALER"].value == 0.0
+
+
+def poorly_seen(found, identifiable, unseen=(60.0,)):
+    """The findings of a log whose input shows so many parameters, and whose model does so well on unseen data."""
+    response = found.responses[0]
+    shown = response.choice.excitation._replace(identifiable=identifiable, verdict=f"{identifiable} of 3 shown")
+    tried = tuple((fit, shown) for fit, _ in response.choice.tried)
+    choice = replace(response.choice, excitation=shown, tried=tried)
+    return replace(found, responses=(replace(response, choice=choice, validation_percent=unseen),))
+
+
+@pytest.mark.parametrize(("autopilot", "delay"), [("px4", "EKF2_OF_DELAY"), ("ardupilot", "EK3_FLOW_DELAY")])
+def test_a_latency_that_is_not_identifiable_is_not_written_and_the_file_says_so(found, tmp_path, autopilot, delay):
+    assert delay in by_name(autopilot, poorly_seen(found, 2))
+    poor = poorly_seen(found, 1)
+    assert poor.excitation.identifiable == 1
+    assert delay not in by_name(autopilot, poor)
+    write_parameters(tmp_path / "file", autopilot, poor, load_sensor())
+    text = (tmp_path / "file").read_text()
+    assert f"# {delay} is not written: latency: 1 of 3 shown\n" in text
+    assert all(line.startswith("#") for line in text.splitlines() if delay in line)
+    assert dict(left_out(autopilot, poor))[delay] == "latency: 1 of 3 shown"
+
+
+@pytest.mark.parametrize(("identifiable", "unseen", "why"), [
+    (0, (60.0,), ": 0 of 3 shown"),
+    (2, (1.3,), "its model fits 1.3 % of what it was not fitted to, 20 % are needed"),
+    (2, (-30.0, 40.0), "its model fits 5.0 % of what it was not fitted to, 20 % are needed"),
+])  # fmt: skip
+def test_a_gain_that_the_log_does_not_show_is_not_written(found, tmp_path, identifiable, unseen, why):
+    poor = poorly_seen(found, identifiable, unseen)
+    assert "FLOW_FYSCALER" not in by_name("ardupilot", poor)
+    write_parameters(tmp_path / "file", "ardupilot", poor, load_sensor())
+    said = [line for line in (tmp_path / "file").read_text().splitlines() if "FLOW_FYSCALER" in line]
+    assert len(said) == 1
+    assert said[0].startswith("# FLOW_FYSCALER is not written: gain of velocity x ")
+    assert said[0].endswith(why)
+
+
+def test_a_gain_without_unseen_data_is_written_by_its_interval(found):
+    for unseen in ((), (math.nan,), (25.0,)):
+        assert "FLOW_FYSCALER" in by_name("ardupilot", poorly_seen(found, 2, unseen))
+    assert left_out("ardupilot", poorly_seen(found, 3)) == []
 
 
 def test_a_turned_sensor_is_told_how_to_be_set(found, tmp_path):

@@ -14,25 +14,28 @@ import pytest
 
 from flownav.core.compile import ONE_LANE
 from flownav.core.frames import euler_from_quaternion, quaternion_from_euler, quaternion_product
-from flownav.core.measurement import Measurement, Sensor
-from flownav.estimation.consistency import pack
+from flownav.core.measurement import Sensor
 from flownav.estimation.states import ATTITUDE, GYRO_BIAS, POSITION, QUATERNION, STATES, VELOCITY
 from flownav.live import writing
 from flownav.live.answers import LONGEST_AHEAD_S, estimate_of, quality_of, why_withheld
+from flownav.live.filtering import ROOM
 from flownav.live.hearing import Origin
-from flownav.live.horizon import PATIENT_WINDOWS, WINDOW_S, Horizon, Lags
+from flownav.live.horizon import PATIENT_WINDOWS, WINDOW_S, Lags
 from flownav.live.options import Limits
-from flownav.live.reception import COARSE_S, FRESH_S, VehicleClock
-from flownav.live.reception import WINDOW_S as LEADS_S
+from flownav.live.vehicle_clock import COARSE_S, FRESH_S, VehicleClock
+from flownav.live.vehicle_clock import WINDOW_S as LEADS_S
 from flownav.live.writing import HEAD_EVERY_S, LOCK_WAIT_S, SYNC_S, Writer, claim, is_locked, journal_of
+from flownav.navigation import waiting
 from flownav.navigation.loop import start_navigator
 from flownav.navigation.memory import CLOCK, MEMORY, PROTECTION
 from flownav.navigation.motion_records import ImuMemory
 from flownav.navigation.records import AidMemory, StartMemory
+from flownav.navigation.rings import Given, Rings, numbers_of
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tape import empty_tape
 from flownav.navigation.told import NO_HEADING, Equipment
 from mavlink_logs import made
+from packed_covariance import pack
 
 ANY_START_S = pytest.mark.parametrize("start_s", [0.0, 1e4, -3600.0, 2.0**32 * 1e-3])
 
@@ -79,17 +82,17 @@ def test_a_lag_as_long_as_is_waited_for_counts_and_a_longer_one_does_not():
 @ANY_START_S
 def test_the_horizon_takes_what_is_of_the_very_instant_that_it_has_released(start_s):
     """Several sensors speak of one instant: the last of them is no later than the first."""
-    horizon = Horizon()
+    rings, settings = Rings(ROOM, 9), np.zeros(1000)
 
-    def reading(t_s: float, sensor: Sensor = Sensor.BARO) -> Measurement:
-        return Measurement(start_s + t_s + 0.25, sensor, (1.0,), (math.nan,), 0.25)
+    def reading(t_s: float, sensor: Sensor = Sensor.BARO) -> Given:
+        return Given(start_s + t_s + 0.25, int(sensor), numbers_of((1.0,), delay_s=0.25))
 
-    assert horizon.take(reading(1.0))
-    assert [waiting.t_s for waiting in horizon.release(start_s + 1.0, 9)] == [start_s + 1.0]
-    assert horizon.take(reading(1.0, Sensor.RANGE))
-    assert not horizon.take(reading(0.875, Sensor.RANGE))
-    assert horizon.dropped == {"range: late": 1}
-    assert [waiting.reading.sensor for waiting in horizon.release(start_s + 1.0, 9)] == [Sensor.RANGE]
+    assert rings.take(reading(1.0)) == waiting.TAKEN
+    assert rings.release(settings, start_s + 1.0).queue.t_s.tolist() == [start_s + 1.0]
+    assert rings.take(reading(1.0, Sensor.RANGE)) == waiting.TAKEN
+    assert rings.take(reading(0.875, Sensor.RANGE)) == waiting.LATE
+    assert rings.release(settings, start_s + 1.0).queue.sensor.tolist() == [Sensor.RANGE]
+    assert len(rings) == 0
 
 
 # -- the vehicle's clock ------------------------------------------------------------------------------------------
@@ -208,7 +211,7 @@ def running(heading_rad: float, clock_s: float = 40.0):
 def test_what_is_sent_of_roll_and_pitch_errs_as_euler_angles_do(heading_rad):
     """The pose's covariance is J P J' with J by finite differences of small turns about the earth's axes."""
     on, covariance = running(heading_rad)
-    sent = estimate_of(on, np.zeros((0, 7)), 40.0, 40.0, 0)
+    sent = estimate_of(on, Rings(ROOM, 9).now(on.work, on.settings, 40.0), 40.0, 40.0, 0)
     q, small = quaternion_from_euler(0.0, 0.0, heading_rad), 1e-6
     slopes = np.zeros((6, 6))
     slopes[:3, :3] = np.eye(3)

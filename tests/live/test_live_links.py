@@ -92,6 +92,21 @@ def test_datagrams_go_both_ways_over_ipv6_and_strangers_are_not_heard(listening)
         link.close()
 
 
+def test_datagrams_that_the_system_had_no_room_for_are_counted():
+    ours = open_link("udp:127.0.0.1:0")
+    theirs = open_link(f"udpout:127.0.0.1:{ours.port}")
+    sent, read = 20_000, 0
+    for _ in range(sent):
+        theirs.write(bytes(1000))
+    while pieces := ours.read():
+        read += len(pieces)
+    assert 0 < read < sent
+    assert ours.counts["overflowed"] == sent - read
+    assert not theirs.counts
+    ours.close()
+    theirs.close()
+
+
 @needs_ipv6
 def test_every_interface_of_ipv6_hears_ipv4_too():
     ours = open_link("udp:[::]:0")

@@ -12,19 +12,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flownav.core.errors import InputError
-from flownav.core.measurement import Measurement, Sensor
+from flownav.core.measurement import Sensor
 from flownav.estimation.states import POSITION, QUATERNION, STATE, VELOCITY
 from flownav.live.answers import estimate_of
 from flownav.live.byte_links import SerialLink, TcpLink, open_link
-from flownav.live.filtering import BATCH_READINGS, Filtering, Keeper
-from flownav.live.horizon import SILENT_S, Horizon, Source, Sources, Waiting
+from flownav.live.filtering import BATCH_READINGS, ROOM, Filtering, Keeper
+from flownav.live.horizon import SILENT_S, Source, Sources
 from flownav.live.link import Address, parse_url
 from flownav.live.loop import Latency
 from flownav.live.options import Options
-from flownav.live.reception import VehicleClock
 from flownav.live.screen import strip
+from flownav.live.vehicle_clock import VehicleClock
 from flownav.logs.mavlink.framing import LARGEST_FRAME, StreamFrames
+from flownav.navigation import waiting
+from flownav.navigation.rings import Given, Rings, numbers_of
 from mavlink_logs import flight_log, made
+
+NO_SETTINGS = np.zeros(1000)
 
 
 # -- links ------------------------------------------------------------------------------------------------
@@ -129,20 +133,19 @@ def test_a_frame_after_any_bytes_is_found_and_nothing_is_kept_beyond_a_frame(jun
 
 
 # -- horizon and sources ----------------------------------------------------------------------------------
-def at(t_s, delay_s=0.0, sensor=Sensor.RANGE):
-    return Measurement(t_s, sensor, (1.0,), (math.nan,), delay_s)
-
-
 @given(st.lists(st.tuples(st.floats(0.0, 10.0), st.floats(0.0, 0.3)), max_size=60))
 def test_the_horizon_releases_in_order_and_counts_what_is_late(arrivals):
-    horizon, released = Horizon(), []
+    rings, instants, late = Rings(ROOM, 64), [], 0
     for t_s, delay_s in arrivals:
-        horizon.take(at(t_s, delay_s))
-        released += horizon.release(t_s - 0.25, 1000)
-    released += horizon.release(math.inf, 1000)
-    instants = [waiting.t_s for waiting in released]
+        late += rings.take(Given(t_s, int(Sensor.RANGE), numbers_of((1.0,), delay_s=delay_s))) == waiting.LATE
+        found = rings.release(NO_SETTINGS, t_s - 0.25)
+        instants += found.queue.t_s.tolist()
+        pairs = zip(found.queue.t_s, found.arrival_s, strict=True)
+        assert set(pairs) <= {(arrival_s - delay_s, arrival_s) for arrival_s, delay_s in arrivals}
+    instants += rings.release(NO_SETTINGS, math.inf).queue.t_s.tolist()
     assert instants == sorted(instants)
-    assert len(released) + sum(horizon.dropped.values()) == len(arrivals)
+    assert len(instants) + late == len(arrivals)
+    assert len(rings) == 0
 
 
 def test_a_preferred_message_takes_over_and_a_silent_one_gives_way():
@@ -171,33 +174,47 @@ def test_timesync_tells_the_wait_that_stamps_cannot():
     assert clock.now_s(now_s) == pytest.approx(21.03, abs=1e-6)
 
 
+@pytest.mark.parametrize("wait_s", [0.02, 0.08, 0.2])
+def test_the_time_never_steps_back_when_the_link_is_loaded_and_is_right_again_soon(wait_s):
+    """A flood of messages in the queue: everything seems to be told later, all of a sudden."""
+    clock, said_s = VehicleClock(1, 1), []
+    for k in range(500):
+        now_s = 100.0 + 0.01 * k
+        waits = wait_s if k >= 200 else 0.0
+        clock.stamped(made("ATTITUDE", time_boot_ms=round((now_s - 80.0 - waits) * 1e3)), 1, 1, now_s)
+        said_s.append(clock.now_s(now_s))
+    assert said_s == sorted(said_s)
+    assert said_s[-1] == pytest.approx(now_s - 80.0 - wait_s, abs=2e-3)
+
+
 # -- from then to now -------------------------------------------------------------------------------------
 def test_the_estimate_of_now_is_where_the_filter_will_be_when_it_gets_there():
-    """IMU alone between two fixes: carried ahead, and fed to the filter, the same readings give the same bits."""
+    """IMU alone between two fixes: carried ahead, and fed to the filter, the same readings give the same bits; the
+    noise that the filter follows meanwhile is 4 % of a variance.
+    """
     chance = np.random.default_rng(3)
 
     def imu(t_s):
         value = np.array([0.0, 0.0, 0.0, 0.5, -0.3, -9.8]) + chance.normal(0.0, 0.4, 6)
-        return Waiting(t_s, 0, Measurement(t_s, Sensor.IMU, tuple(value), (math.nan,) * 6))
+        return Given(t_s, int(Sensor.IMU), numbers_of(value))
 
-    past = [imu(0.01 * k) for k in range(100)]
-    attitude = Measurement(0.0, Sensor.ATTITUDE, (0.9, 0.1, -0.2, 0.3742), (math.nan,) * 4)
-    fix = Measurement(0.5, Sensor.GPS_POSITION, (1.0, 2.0, -3.0), (1.0,) * 3)
-    past = sorted([*past, Waiting(-0.01, 0, attitude), Waiting(0.505, 0, fix)])
-    coming = [imu(1.0 + 0.01 * k) for k in range(30)]
+    attitude = Given(-0.01, int(Sensor.ATTITUDE), numbers_of((0.9, 0.1, -0.2, 0.3742)))
+    fix = Given(0.505, int(Sensor.GPS_POSITION), numbers_of((1.0, 2.0, -3.0), (1.0,) * 3))
     filtering = Filtering(Options(), Keeper())
-    filtering.begin(past, gps_heard=True)
-    for start in range(0, len(past), BATCH_READINGS):
-        filtering.feed(past[start : start + BATCH_READINGS])
-    for waiting in coming:
-        filtering.heard(waiting)
+    for reading in [attitude, *(imu(0.01 * k) for k in range(100)), fix]:
+        assert filtering.rings.take(reading) == waiting.TAKEN
+    filtering.begin(gps_heard=True)
+    for readings in (BATCH_READINGS, 102 - BATCH_READINGS, 0):
+        assert filtering.feed(0.999).readings == readings
+    for k in range(30):
+        filtering.rings.take(imu(1.0 + 0.01 * k))
     on = filtering.running
-    ahead = estimate_of(on, filtering.imu_after(filtering.clock_s), 1.29, 1.29, 0)
-    sure = estimate_of(on, filtering.imu_after(filtering.clock_s), filtering.clock_s, 0.99, 0)
+    ahead = estimate_of(on, filtering.now(1.29), 1.29, 1.29, 0)
+    sure = estimate_of(on, filtering.now(filtering.clock_s), filtering.clock_s, 0.99, 0)
     assert ahead.pose_covariance[0, 0] > sure.pose_covariance[0, 0]
-    filtering.feed(coming)
-    there = estimate_of(on, filtering.imu_after(filtering.clock_s), filtering.clock_s, 1.29, 0)
-    np.testing.assert_allclose(np.diag(ahead.pose_covariance), np.diag(there.pose_covariance), rtol=0.02)
+    assert filtering.feed(2.0).readings == 30
+    there = estimate_of(on, filtering.now(filtering.clock_s), filtering.clock_s, 1.29, 0)
+    np.testing.assert_allclose(np.diag(ahead.pose_covariance), np.diag(there.pose_covariance), rtol=0.06)
     np.testing.assert_allclose(np.diag(ahead.velocity_covariance), np.diag(there.velocity_covariance), rtol=0.02)
     assert filtering.clock_s == pytest.approx(1.29)
     assert ahead.pos_ned_m == tuple(on.work[STATE + POSITION : STATE + POSITION + 3])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import pty
 import resource
@@ -99,6 +100,48 @@ def test_a_full_disk_in_flight_is_said_and_the_session_goes_on(tmp_path):
     if found is None:  # the record would have been too large as well
         subprocess.run([sys.executable, "-m", "flownav", "recover", facts["journal"]], check=True)
     assert len(replayed(path).estimate) > 10
+
+
+@pytest.mark.parametrize("kind", ["attitude", "imu", "heartbeat", "junk"])
+def test_twenty_thousand_messages_a_second_take_nothing_but_time(tmp_path, kind):
+    """In mid-flight, on the vehicle's own port: what is sent stays true and of now, goes on, and its time never steps
+    back.
+    """
+    with LiveProcess(tmp_path / "live.fnr", "--json") as live:
+        mav, last_s, sent = live.vehicle.mav, time.monotonic(), 0
+
+        def flood():
+            nonlocal last_s, sent
+            now_s = time.monotonic()
+            ms = round((live.vehicle.boot_s + now_s - live._start_s) * 1e3)
+            frame = {
+                "attitude": lambda: bytes(mav.attitude_encode(ms, *[0.0] * 6).pack(mav)),
+                "imu": lambda: bytes(mav.highres_imu_encode(1000 * ms, 0, 0, -9.8, *[0] * 10, 0x3F).pack(mav)),
+                "heartbeat": lambda: bytes(mav.heartbeat_encode(2, 3, 0, 0, 4, 3).pack(mav)),
+                "junk": lambda: b"\xfd" * 60,
+            }[kind]()
+            many = min(round(20_000 * (now_s - last_s)), 2_000)
+            for _ in range(many):
+                live.link.write(frame)
+            last_s, sent = now_s, sent + many
+
+        live.fly(150)
+        live.heard.clear()
+        until_s = last_s = time.monotonic()
+        until_s += 5.0
+        while time.monotonic() < until_s:
+            live.fly(1, beside=flood)
+        assert sent > 50_000
+        flooded = len(live.heard)
+        live.fly(100)
+        print(f"{kind}: {sent} in 5 s, {flooded} estimates, {max(age_s for age_s, _ in live.heard):.2f} s old at most")
+        assert max(math.hypot(said.x, said.y) for _, said in live.heard) < 0.5
+        assert max(age_s for age_s, _ in live.heard) < 2.0
+        stamps_us = [said.time_usec for _, said in live.heard]
+        assert stamps_us == sorted(stamps_us)
+        output, errors = live.end(signal.SIGINT)
+    assert live.process.returncode == 0, errors
+    assert json.loads(output)["resets"] <= 1
 
 
 def test_a_terminal_that_nobody_reads_holds_nobody_up(tmp_path):

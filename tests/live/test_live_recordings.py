@@ -12,11 +12,13 @@ from flownav.core.measurement import Sensor
 from flownav.live.filtering import Keeper
 from flownav.live.options import Limits, Options
 from flownav.logs.mavlink.framing import coder
+from flownav.navigation.memory import PROTECTION
 from recorded_link import Arrival, arrivals, play
 
 GPS_RAW_INT, TIMESYNC, COMMAND_LONG, GLOBAL_ORIGIN = 24, 111, 76, 49
 GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
 FIX_S = 8.0  # the receiver's first fix, after the beginning of each recording
+BEGUN_S = FIX_S + 3.0  # by then a navigator that began without it has begun anew with it
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +41,11 @@ def sent_of(sent, name):
 def longest_gap_s(sent, since_s=0.0):
     times = [now_s for now_s, _ in sent_of(sent, "ODOMETRY") if now_s >= since_s]
     return max(later - before for before, later in pairwise(times))
+
+
+def began_s(sent):
+    """From when on a navigator flies that has GPS."""
+    return sent[0].now_s + BEGUN_S
 
 
 def delayed(frames, which, by_s):
@@ -74,7 +81,8 @@ def test_gps_is_fused_whatever_its_phase_to_the_stream(link, shift_s):
     assert not session.alarms
     assert session.reason == ""
     assert session.hearing.horizon_s < 0.45
-    assert longest_gap_s(sent) < 0.1
+    assert longest_gap_s(sent, began_s(sent)) < 0.1
+    assert longest_gap_s(sent) < 0.5  # where it is begun anew with GPS, on the ground
 
 
 @pytest.mark.parametrize("period_s", [0.1, 0.2])
@@ -84,7 +92,20 @@ def test_a_link_that_delivers_in_batches_loses_nothing(link, period_s):
     assert session.hearing.readings[Sensor.FLOW_RATE] > 900
     assert not [name for name in session.dropped if name.endswith(": late")]
     assert session.reason == ""
-    assert longest_gap_s(sent) < period_s + 0.1
+    assert longest_gap_s(sent, began_s(sent)) < period_s + 0.1
+
+
+@pytest.mark.parametrize(("stated_m", "least_m", "most_m"), [(None, 5.8, 6.2), (0.3, 1.5, 2.0)])
+def test_the_level_at_rest_is_what_the_receiver_is_stated_to_be_off(link, stated_m, least_m, most_m):
+    """Four sigma of a receiver's slow error, which no reading of a vehicle at rest tells from a place."""
+    options = Options()
+    if stated_m is not None:
+        slow = {"gps_slow_sigma_m": stated_m, "gps_slow_sigma_down_m": stated_m}
+        options = Options(settings=options.settings.model_copy(update=slow))
+    session, sent = play(link("square", 60.0), options=options)
+    assert least_m < session.filtering.running.work[PROTECTION] < most_m
+    last = sent_of(sent, "ODOMETRY")[-1][1]
+    assert np.hypot(last.x, last.y) < 0.05
 
 
 @pytest.mark.slow
@@ -136,7 +157,7 @@ def test_a_timesync_that_lies_does_not_stop_the_sending(link):
     session, sent = play([lied(arrival) for arrival in link("square", 20.0)])
     assert session.dropped["clock: timesync_refused"] > 10
     assert session.reason == ""
-    assert longest_gap_s(sent) < 0.1
+    assert longest_gap_s(sent, began_s(sent)) < 0.1
     stamps = [message.time_usec * 1e-6 for _, message in sent_of(sent, "ODOMETRY")]
     assert max(stamps) < session.hearing.newest_s + 0.1
 

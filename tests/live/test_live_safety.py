@@ -18,8 +18,8 @@ from flownav.core.measurement import Sensor
 from flownav.estimation.states import POSITION, STATE
 from flownav.live.answers import why_withheld
 from flownav.live.display import draw
-from flownav.live.filtering import Keeper
-from flownav.live.horizon import MOST_WAITING, Refused
+from flownav.live.filtering import ROOM, Keeper
+from flownav.live.horizon import Refused
 from flownav.live.loop import Latency
 from flownav.live.options import Limits, Options
 from flownav.live.reception import BESIDE, Accepted, accepted_by, accepted_of
@@ -33,6 +33,7 @@ from flownav.navigation.memory import PROTECTION
 from live_ends import HEIGHT_M, ORIGIN, START_S, UNIX_S, Hover, Wire, hovering, reading
 
 KEY = bytes(range(32))
+MOST_WAITING = int(ROOM.most)
 
 
 @pytest.fixture
@@ -155,10 +156,10 @@ def test_a_flood_is_dropped_and_counted_and_memory_stays():
     mav = wire.vehicle.mav
     ahead_us = round((wire.vehicle.boot_s + wire.t_s) * 1e6)
     for k in range(2 * MOST_WAITING):
-        stamp = ahead_us + 1_000_000 + k  # a second ahead: all would wait
+        stamp = ahead_us + 1_000_000 + 1000 * (k % 500)  # a second ahead: all would wait
         message = mav.highres_imu_encode(stamp, 0, 0, -9.8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x3F)
         wire.session.take(bytes(message.pack(mav)), wire.now_s, whole=True)
-        assert len(wire.session.hearing.horizon) <= MOST_WAITING
+        assert len(wire.session.filtering.rings) <= MOST_WAITING
     assert wire.session.dropped["imu: overflow"] > MOST_WAITING // 2
     began = wire.t_s
     wire.fly(12.0)
@@ -314,11 +315,11 @@ def shown(wire):
 
 
 def test_while_a_fault_is_suspected_nothing_is_sent_and_the_screen_names_it():
-    """GPS drifts north at 2 m/s; flow, IMU and the receiver's own velocity say that the vehicle hovers."""
+    """GPS drifts north at 1 m/s; flow, IMU and the receiver's own velocity say that the vehicle hovers."""
     wire, told = hovering(12), {}
 
     def drift():
-        wire.vehicle.north_m += 0.02
+        wire.vehicle.north_m += 0.01
         if wire.session.reason == "fault_suspected" and not told:
             told.update(t_s=wire.t_s, screen=shown(wire))
 
@@ -331,6 +332,20 @@ def test_while_a_fault_is_suspected_nothing_is_sent_and_the_screen_names_it():
     assert wire.estimates(told["t_s"] - 1.0)
     assert not wire.estimates(told["t_s"] + 0.02)
     assert wire.session.withheld["fault_suspected"] > 100
+
+
+@pytest.mark.parametrize("drift_m_s", [2.0, 5.0])
+def test_a_position_that_leaves_its_receivers_velocity_and_the_flow_is_refused_before_it_leads_far(drift_m_s):
+    """4.8 m in 6 s before; slower ones lead further: at 1 m/s 2.0 m until it is suspected, at 0.5 m/s 2.5 m in 12 s."""
+    wire = hovering(12)
+
+    def drift():
+        wire.vehicle.north_m += 0.01 * drift_m_s
+
+    wire.fly(12.0, beside=drift)
+    assert abs(wire.session.estimate.pos_ned_m[0]) < 0.5
+    assert wire.session.reason == ""
+    assert wire.session.alarms[Sensor.GPS_POSITION].why == "innovation_gate"
 
 
 def test_without_protection_nothing_is_sent(wires):
@@ -572,11 +587,11 @@ def test_an_imu_that_comes_late_serves(wires):
 
 
 class Standing(Hover):
-    """On the ground, indoors: landed, and a flow sensor that sees nothing."""
+    """On the ground, indoors: landed, a flow sensor that sees nothing, and a range too short to be told."""
 
     def frames(self, t_s):
         step = self.steps
-        frames = [f for f in super().frames(t_s) if f[7] | f[8] << 8 != 106]
+        frames = [f for f in super().frames(t_s) if f[7] | f[8] << 8 not in (106, 132)]
         if step % 2 == 0:
             blind = reading(Sensor.FLOW_RATE, 0.0, 0.0, 0.0, 0.0)._replace(quality=0.0)
             time_us = round((self.boot_s + t_s) * 1e6)
@@ -591,6 +606,26 @@ def test_a_vehicle_that_stands_indoors_is_told_where_it_is(wires):
     wire = wires(Standing(gps=False)).fly(12.0)
     assert wire.session.reason == ""
     assert_all_good(wire, at_least=100)
+
+
+class Liar(Hover):
+    """It flies, 2 m up, and says for six seconds that it has landed."""
+
+    def frames(self, t_s):
+        frames = super().frames(t_s)
+        if self.steps % 20 == 0:
+            frames.append(bytes(self.mav.extended_sys_state_encode(0, 1 if 12.0 < t_s < 18.0 else 2).pack(self.mav)))
+        return frames
+
+
+def test_landed_that_is_said_in_flight_is_an_alarm_and_moves_nothing(wires):
+    wire = wires(Liar()).fly(17.9)
+    assert wire.session.alarms[Sensor.LANDED].why == "innovation_gate"
+    assert wire.session.reason == ""
+    told = wire.session.estimate
+    assert np.abs(np.array(told.pos_ned_m[:2])).max() < 0.3
+    wire.fly(4.0)
+    assert Sensor.LANDED not in wire.session.alarms
 
 
 def test_alarms_that_ended_are_kept(wires):

@@ -522,7 +522,7 @@ def test_over_tcp():
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--write"], "--write and --source-set go with --setup only"),
+        (["--write"], "--write, --source-set and --origin go with --setup only"),
         (["--setup", "--record", "x.fnr"], "--setup flies nothing"),
         (["--setup", "--source-set", "4"], "--source-set 4: must be from 1 to 3"),
         (["--setup", "--send", "all"], "--send all"),
@@ -533,3 +533,13 @@ def test_mistakes_are_one_line(options, said, tmp_path, monkeypatch):
     result = CliRunner().invoke(app, ["live", "udp:0", *options])
     assert isinstance(result.exception, InputError)
     assert said in printed(result.exception)
+
+
+def test_a_gimbal_that_says_it_is_an_autopilot_is_not_written_to():
+    """It is heard first, a second before the autopilot."""
+    link = FakeLink(FakeAutopilot(ARDUPILOT, {"A": 1}))
+    mav = coder(1, 154)
+    link._to_us.append(bytes(mav.heartbeat_encode(2, ARDUPILOT, 0, 0, 4, 3).pack(mav)))
+    link._beat_s = link.now_s
+    talk = Talk(link, clock=link.clock, wait=link.wait)
+    assert talk.meet(10.0)[:2] == (1, 1)

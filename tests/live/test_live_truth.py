@@ -86,11 +86,12 @@ def test_a_vehicle_is_not_asked_for_it():
     assert "SIM_STATE" not in autopilot.session.requests.refused
 
 
-def test_px4s_simulator_says_so_in_its_heartbeat():
-    assert 115 in Autopilot(PX4, simulated=True, base_mode=HIL_FLAG).live(3.0).asked
-    vehicle = Autopilot(PX4, simulated=False).live(3.0)
-    assert 115 not in vehicle.asked
-    assert vehicle.parameters_asked == 0
+@pytest.mark.parametrize(("simulated", "base_mode"), [(True, HIL_FLAG), (True, 0), (False, 0)])
+def test_px4_is_asked_whether_it_says_that_it_is_simulated_or_not(simulated, base_mode):
+    """SIH's heartbeat has no HIL bit; a vehicle has no truth to tell, and refuses."""
+    autopilot = Autopilot(PX4, simulated=simulated, base_mode=base_mode).live(3.0)
+    assert 115 in autopilot.asked
+    assert autopilot.parameters_asked == 0
 
 
 def test_after_a_reboot_it_is_asked_for_again():

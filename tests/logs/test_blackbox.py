@@ -123,6 +123,16 @@ def test_signs_are_those_of_the_firmware(tmp_path):
     assert read.autopilot_name == "INAV 7.1.0"
 
 
+def test_the_gyro_of_cleanflight_has_names_of_its_own(tmp_path):
+    names = ("time", *(f"{name}[{k}]" for name in ("gyroData", "accSmooth") for k in range(3)))
+    log = BlackboxLog({"Firmware type": "Cleanflight", "Firmware revision": "d72983e", "acc_1G": "4096",
+                       "gyro.scale": "0x3d79c190"}, [(name, 0, 1, 0) for name in names])  # fmt: skip
+    log.rows = [[10_000 * k, 164, 0, 0, 0, 0, 4096] for k in range(40)]
+    read = read_blackbox(written(tmp_path / "a.TXT", log.content()))
+    assert read.streams[Sensor.IMU].value[0] == pytest.approx([np.radians(10.0), 0, 0, 0, 0, -9.80665], rel=1e-3)
+    assert read.notes[0].startswith("Cleanflight d72983e, frames of ")
+
+
 @pytest.mark.parametrize(("write", "code", "count", "most"), [
     (tag2_3s32, 7, 3, (1, 7, 31, 127, 32767, 8_388_607, 2**31 - 1)),
     (tag2_3svariable, 10, 3, (1, 7, 63, 32767, 2**31 - 1)),

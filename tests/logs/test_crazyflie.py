@@ -7,13 +7,13 @@ import struct
 import numpy as np
 import pytest
 
-from crazyflie_logs import RAD_PER_COUNT, DeckLog, deck_log, quantised
+from crazyflie_logs import RAD_PER_COUNT, DeckLog, deck_log, event_log, quantised
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
 from flownav.logs.crazyflie import read_crazyflie
 from flownav.logs.open_log import log_kind, open_log
 from replay_logs import SyntheticLog, log_of_flight
-from replayed_alike import apart, largest_difference
+from replayed_alike import apart, estimate_of, largest_difference
 
 CLOSE = {Sensor.IMU: 2e-6, Sensor.ATTITUDE: 1e-3, Sensor.FLOW_RATE: 1e-9, Sensor.RANGE: 1e-9, Sensor.BARO: 1e-5,
          Sensor.MAG: 1e-6}  # fmt: skip
@@ -122,6 +122,144 @@ def test_motion_capture_is_the_reference_and_the_estimators_state_the_autopilots
     c, s = np.cos(-0.2), np.sin(-0.2)
     forward = c * speed[:, 0] + s * speed[:, 1]
     assert np.allclose(log.autopilot["vel_u_m_s"], forward, atol=1e-5)
+
+
+# -- the estimator's events ------------------------------------------------------------------------------------
+@pytest.fixture(scope="module")
+def quick():
+    """A flight with an IMU of 1 kHz, as the events have it; the first five seconds stand."""
+    return log_of_flight(20.0, flow_hz=100.0, imu_hz=1000.0)
+
+
+@pytest.fixture(scope="module")
+def quick_tables(quick):
+    return quantised(quick.tables)
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_events_apart_are_the_readings_of_the_flight(quick, quick_tables, tmp_path, version):
+    """Gyro and accelerometer of two blocks, a barometer at the gyro's rate, a flow without its still reads."""
+    log = open_log(written(tmp_path / "log", event_log(quick_tables, version=version)))
+    imu, known = log.streams[Sensor.IMU], quick_tables["imu"]
+    assert np.allclose(imu.t_s, known["t_s"], atol=1e-3)
+    for axis, name in enumerate("xyz"):
+        assert np.allclose(imu.value[:, axis], known[f"gyro_{name}_rad_s"], atol=1e-5)
+        assert np.allclose(imu.value[:, 3 + axis], known[f"accel_{name}_m_s2"], atol=0.02)  # 60 us, 1 ms in version 1
+    baro, heights = log.streams[Sensor.BARO], quick_tables["baro"]["alt_m"]
+    assert len(baro) < 250
+    assert baro.rejected == {"repeated": 20_000 - len(baro)}
+    assert np.array_equal(np.unique(baro.value), np.unique(heights.astype(np.float32)))
+    assert np.allclose(log.streams[Sensor.RANGE].value[:, 0], quick_tables["range"]["range_m"], atol=1e-9)
+
+
+def test_flow_has_its_reads_without_motion_again(quick_tables, tmp_path):
+    log = open_log(written(tmp_path / "log", event_log(quick_tables)))
+    flow, known = log.streams[Sensor.FLOW_RATE], quick_tables["flow"]
+    row = np.rint(100.0 * (flow.t_s + log.clock_start_s - 30.0)).astype(int)
+    for axis, name in enumerate("xy"):
+        assert np.allclose(flow.value[:, axis], known[f"flow_{name}_rad_s"][row], atol=1e-9)
+    moved = (known["flow_x_rad_s"] != 0) | (known["flow_y_rad_s"] != 0)
+    assert len(row) == len(set(row))
+    assert np.count_nonzero(~moved[row]) > 20
+    assert set(range(np.flatnonzero(moved)[20], np.flatnonzero(moved)[-1])) <= set(row)  # in flight all
+    assert f"; {np.count_nonzero(~moved[row])} reads without motion, which are no events, are put back" in log.notes[0]
+
+
+@pytest.mark.parametrize("lost", [0.0, 0.05])
+def test_a_log_of_events_replays_as_the_csv_folder_does(quick_tables, tmp_path, lost):
+    """Also where the deck had no room for one block in twenty."""
+    plain = {name: quick_tables[name] for name in ("imu", "flow", "range", "baro")}
+    folder = SyntheticLog(plain).write(tmp_path / "csv")
+    path = written(tmp_path / "log", event_log(quick_tables, lost=lost))
+    later_s = 30.0 - open_log(path).clock_start_s
+    ours, known = estimate_of(open_log(path)), estimate_of(open_log(folder))
+    assert ours["t_s"][0] < 1.5  # on the ground, where the flow has no events
+    for name, apart_m in (("pos_n_m", 1.0), ("pos_e_m", 1.0), ("pos_d_m", 0.05)):
+        there = np.interp(ours["t_s"] - later_s, known["t_s"], known[name])
+        assert np.abs(ours[name] - there).max() < apart_m  # of 40 m, on counts of 0.2 rad/s
+
+
+def test_a_lost_block_of_a_fast_flow_is_no_standing(tmp_path):
+    t = np.delete(np.arange(100) * 0.01, 50)
+    fast, slow = np.full(99, 6.0), np.where(np.arange(99) % 2 == 0, 1.0, -1.0)
+    for counts, rows in ((fast, 99), (slow, 100)):
+        log = DeckLog().add("estFlow", ["motion.deltaX(h)", "motion.deltaY(h)"], t, counts, 0.0 * counts)
+        flow = read_crazyflie(written(tmp_path / "log", log)).streams[Sensor.FLOW_RATE]
+        assert len(flow) == rows
+    assert flow.value[50, 0] == 0.0
+    assert flow.t_s[50] == pytest.approx(0.5)
+
+
+def test_of_a_long_silence_only_its_ends_are_reads_without_motion(tmp_path):
+    """The sensor is silent as well where it sees nothing."""
+    t = np.append(np.arange(50), 909 + np.arange(50)) * 0.011
+    log = DeckLog().add("estFlow", ["motion.deltaX(h)", "motion.deltaY(h)"], t, np.ones(100), np.zeros(100))
+    flow = read_crazyflie(written(tmp_path / "log", log)).streams[Sensor.FLOW_RATE]
+    still = flow.t_s[flow.value[:, 0] == 0.0]
+    assert np.allclose(still, np.append(49 + np.arange(1, 10), 909 - np.arange(9, 0, -1)) * 0.011, atol=1e-3)
+    assert flow.value[0, 0] == pytest.approx(-RAD_PER_COUNT / 0.011)  # as often as the events follow each other
+    assert (np.diff(flow.t_s) > 0).all()
+
+
+def test_on_the_ground_all_reads_are_without_motion(tmp_path):
+    """From the log's beginning on, so that the navigator starts where the vehicle stands and not at its take-off."""
+    t = 5.0 + np.arange(50) * 0.01
+    log = DeckLog().add("estFlow", ["motion.deltaX(h)", "motion.deltaY(h)"], t, np.ones(50), np.zeros(50))
+    ranged = np.arange(0.0, 8.0, 0.025)
+    log.add("estTOF", ["range.zrange(H)"], ranged, np.where(ranged < 4.0, 25.0, 400.0))
+    flow = read_crazyflie(written(tmp_path / "log", log)).streams[Sensor.FLOW_RATE]
+    still = flow.t_s[flow.value[:, 0] == 0.0]
+    assert np.allclose(still[still < 3.99], np.arange(1, len(still[still < 3.99]) + 1) * 0.01)
+    in_the_air = np.concatenate([np.arange(490, 500), np.arange(550, 560), np.arange(788, 798)])
+    assert np.allclose(still[still > 4.0], 0.01 * in_the_air, atol=5e-3)  # the log ends at 7.975 s
+
+
+def test_gyro_readings_without_an_accelerometer_near_by_are_left_out_and_counted(tmp_path):
+    t = np.arange(2000) * 1e-3
+    log = DeckLog().add("estGyroscope", [f"gyro.{axis}(f)" for axis in "xyz"], t, t, t, t)
+    force = t[t < 1.0]
+    log.add("estAcceleration", [f"acc.{axis}(f)" for axis in "xyz"], force, force, force, 1.0 + force)
+    imu = read_crazyflie(written(tmp_path / "log", log)).streams[Sensor.IMU]
+    assert imu.t_s[-1] == pytest.approx(1.0, abs=0.11)
+    assert imu.rejected == {"no_accelerometer": 2000 - len(imu)}
+    assert np.allclose(imu.value[:900, 5], -9.80665 * (1.0 + t[:900]), atol=1e-4)
+
+
+def test_the_attitude_of_motion_capture_is_the_references(quick_tables, tmp_path):
+    t = np.arange(0.0, 20.0, 0.01)
+    yaw = 0.3 * t
+    pose = {"t_s": t, "n": np.cos(t), "e": np.sin(t), "d": -0.1 * t, "qw": np.cos(0.5 * yaw), "qx": 0.0 * t,
+            "qy": 0.0 * t, "qz": np.sin(0.5 * yaw)}  # fmt: skip
+    log = open_log(written(tmp_path / "log", event_log(quick_tables, pose)))
+    assert log.truth_name == "motion capture (locSrv)"
+    assert np.allclose(log.truth["pos_e_m"], np.sin(t), atol=1e-6)
+    heading = 2.0 * np.arctan2(log.truth["qz"], log.truth["qw"])
+    assert np.allclose(np.unwrap(heading), yaw, atol=1e-5)
+
+
+def test_the_short_form_of_the_estimators_state_is_in_millimetres(tmp_path):
+    t = np.arange(100) * 0.01
+    names = [f"stateEstimateZ.{name}(h)" for name in ("x", "y", "z", "vx", "vy", "vz")]
+    log = DeckLog().add("fixedFrequency", ["baro.asl(f)", *names], t, 3.0 + t, *(1000.0 * k + 0 * t for k in range(6)))
+    own = read_crazyflie(written(tmp_path / "log", log)).autopilot
+    assert [own[name][0] for name in ("pos_n_m", "pos_e_m", "pos_d_m")] == [0.0, -1.0, -2.0]
+
+
+def test_the_lighthouse_decks_position_is_a_reference_too(tmp_path):
+    t = np.arange(100) * 0.01
+    log = DeckLog().add("estBarometer", ["baro.asl(f)"], t, 3.0 + 0.1 * t)
+    log.add("lhPosition", ["x(f)", "y(f)", "z(f)"], t, t, 2.0 * t, 3.0 * t)
+    read = read_crazyflie(written(tmp_path / "log", log))
+    assert read.truth_name == "the lighthouse deck"
+    assert np.allclose(read.truth["pos_d_m"], -3.0 * t, atol=1e-6)
+
+
+def test_a_range_at_the_rate_of_a_quick_block_is_each_reading_once(tmp_path):
+    t = np.arange(1000) * 1e-3
+    mm = 500.0 + np.floor(t / 0.025)
+    log = DeckLog().add("fixedFrequency", ["range.zrange(H)"], t, mm)
+    found = read_crazyflie(written(tmp_path / "log", log)).streams[Sensor.RANGE]
+    assert np.allclose(found.value[:, 0], np.unique(mm) * 1e-3)
 
 
 def test_a_log_that_was_not_closed_is_read_as_far_as_it_goes(tables, tmp_path):

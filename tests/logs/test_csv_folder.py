@@ -153,6 +153,37 @@ def test_truth_is_carried_along(folder):
     assert truth["pos_e_m"] == pytest.approx(2 * t_s)
 
 
+@pytest.mark.parametrize(("name", "sensor"), [("baro", Sensor.BARO), ("mag", Sensor.MAG)])
+def test_a_slow_sensor_written_at_the_imus_rate_is_each_reading_once(folder, name, sensor):
+    """A barometer of 25 Hz with 950 rows a second is no 950 independent readings a second."""
+    header, *rows = rows_of(folder / f"{name}.csv")
+    known = read_csv_folder(folder).streams[sensor]
+    times = np.arange(0.0, DURATION_S - 0.1, 0.001)
+    last = np.searchsorted(known.t_s, times, side="right") - 1
+    put(folder / f"{name}.csv", [header, *([f"{t:.3f}", *rows[k][1:]] for t, k in zip(times, last, strict=True))])
+    once = read_csv_folder(folder).streams[sensor]
+    assert once.rejected == {"repeated": len(times) - len(once)}
+    assert len(once) < 1.05 * len(known)
+    assert np.array_equal(once.value[:50], known.value[np.searchsorted(known.t_s, once.t_s[:50], side="right") - 1])
+
+
+def test_a_receiver_that_never_tells_a_velocity_has_none(folder):
+    header, *rows = rows_of(folder / "gps.csv")
+    place = header.index("vel_n_m_s")
+    put(folder / "gps.csv", [header, *([*row[:place], "nan", "nan", "nan"] for row in rows)])
+    streams = read_csv_folder(folder).streams
+    assert Sensor.GPS_POSITION in streams
+    assert Sensor.GPS_VELOCITY not in streams
+
+
+def test_a_slow_sensor_that_repeats_itself_at_its_own_rate_stays_as_it_is(folder):
+    header, *rows = rows_of(folder / "baro.csv")
+    put(folder / "baro.csv", [header, *([row[0], "12.5"] for row in rows)])
+    baro = read_csv_folder(folder).streams[Sensor.BARO]
+    assert len(baro) == len(rows)
+    assert baro.rejected == {}
+
+
 # -- what cannot be read -----------------------------------------------------------------------------------
 def test_no_folder(tmp_path):
     assert "no such folder" in complaint(tmp_path / "absent")

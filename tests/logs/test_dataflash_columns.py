@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pymavlink.DFReader import DFReader_binary
+from pymavlink.DFReader import DFReader_binary, DFReader_text
 
-from dataflash_files import HEAD, DataFlashWriter
+from dataflash_files import HEAD, DataFlashWriter, as_text
 from flownav.core.errors import InputError
 from flownav.logs.dataflash import DataFlash, read_columns
 from flownav.logs.dataflash.columns import text
@@ -87,6 +87,27 @@ def test_every_format_character_equals_pymavlink(tmp_path):
     path = tmp_path / "all.bin"
     path.write_bytes(writer.content())
     assert_as_pymavlink(path)
+
+
+def test_the_text_form_equals_pymavlinks(tmp_path):
+    limits = {code: ends for code, ends in LIMITS.items() if code != "M"}
+    writer = DataFlashWriter(units=False)
+    writer.define("KIND", "".join(limits), ",".join(f"F{k}" for k in range(len(limits))))
+    writer.define("MODE", "Mh", "Mode,ThrCrs")
+    for share in (0.0, 0.1, 0.4, 0.9):
+        values = [low + share * (high - low) for low, high in limits.values()]
+        writer.put("KIND", *values)
+        writer.put("MODE", 5, 3)
+    path = tmp_path / "log.log"
+    path.write_text(as_text(writer.content()))
+    log, theirs = DataFlash(path), DFReader_text(str(path))
+    table = log.table("KIND")
+    for row in range(4):
+        message = theirs.recv_match(type="KIND")
+        for label in log.formats["KIND"].labels:
+            assert table[label][row] == pytest.approx(float(getattr(message, label)), rel=1e-6), label
+    theirs.close()
+    assert log.table("MODE")["ThrCrs"].tolist() == [3] * 4  # the mode itself is a name, which a number field has not
 
 
 def test_units_factors_and_instances_are_what_the_file_says(tmp_path):

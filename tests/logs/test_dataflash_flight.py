@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from dataflash_files import DataFlashWriter, dataflash_of, define_flight
+from dataflash_files import DataFlashWriter, as_text, dataflash_of, define_flight, old_dataflash_of
 from flownav.core.errors import InputError
 from flownav.core.frames import euler_from_quaternion, rotation_from_quaternion, to_earth
 from flownav.core.measurement import Sensor, Stream
@@ -96,6 +97,14 @@ def test_the_delays_that_the_vehicle_was_told_of_are_the_streams(tmp_path, fligh
     writer = dataflash_of(flight)
     writer.put("PARM", 40e6, "GPS1_DELAY_MS", 180.0)
     assert read(tmp_path, writer).streams[Sensor.GPS_POSITION].delay_s == pytest.approx(0.18)
+
+
+def test_a_setting_that_is_no_number_is_read_without_a_warning(tmp_path, flight):
+    """A flipped bit makes a NaN that signals, and NumPy warns where it is made a double (real log, seed 24)."""
+    writer = dataflash_of(flight)
+    writer.put("PARM", 40e6, "GPS1_DELAY_MS", 12345.0)
+    writer.parts[-1] = writer.parts[-1].replace(struct.pack("<f", 12345.0), struct.pack("<I", 0x7FA00000))
+    assert np.isfinite(read(tmp_path, writer).streams[Sensor.GPS_POSITION].delay_s)
 
 
 def test_landings_and_take_offs_are_a_stream(tmp_path, flight):
@@ -234,6 +243,61 @@ def test_a_sensor_without_a_usable_row_and_one_without_a_needed_field_are_told(t
     assert "RFND: no usable row (1 invalid)" in log.notes
     assert "MAG lacks a field that is needed (MagX, MagY, MagZ)" in log.notes
     assert [absence.what for absence in log.absences] == ["no downward rangefinder (RFND)"]
+
+
+# -- logs of years before --------------------------------------------------------------------------------------
+@pytest.mark.parametrize("written", [lambda w: w.content(), lambda w: as_text(w.content()).encode()],
+                         ids=["binary", "text"])  # fmt: skip
+def test_a_log_of_milliseconds_is_the_same_log_as_a_csv_folder(tmp_path, flight, written):
+    """ATT in milliseconds since boot, GPS in its week's with the vehicle's time beside it, RFND with its first name."""
+    log = read(tmp_path, written(old_dataflash_of(flight)))
+    theirs = read_csv_folder(flight.write(tmp_path / "folder"))
+    assert set(log.streams) == set(theirs.streams)
+    assert log.clock_start_s == pytest.approx(40.0)
+    for sensor, stream in theirs.streams.items():
+        assert log.streams[sensor].t_s == pytest.approx(stream.t_s, abs=6e-4)
+        limit = max(TOLERANCE.get(sensor, 1e-5), 6e-3 if sensor in (Sensor.GPS_VELOCITY, Sensor.BARO) else 0.0)
+        assert np.abs(log.streams[sensor].value - stream.value).max() < limit, sensor
+    assert log.notes == ()
+
+
+def test_events_without_a_time_have_that_of_the_message_before(tmp_path, flight):
+    writer = old_dataflash_of(flight)
+    kind, imu = writer.types["EV"][0], writer.types["IMU"][0]
+    rows = [k for k, part in enumerate(writer.parts) if part[2] == imu]
+    for place, event in sorted({rows[800]: 18, rows[150]: 28}.items(), reverse=True):
+        writer.parts.insert(place + 1, bytes((0xA3, 0x95, kind, event)))
+    landed = read(tmp_path, writer).streams[Sensor.LANDED]
+    assert landed.t_s == pytest.approx([0.0, 3.0, 16.0], abs=0.021)  # of an IMU of 50 Hz
+    assert landed.value[:, 0].tolist() == [1.0, 0.0, 1.0]
+
+
+def test_the_first_ekf_of_all_is_the_autopilots_estimate(tmp_path, flight):
+    writer = old_dataflash_of(flight)
+    for k in range(100):
+        writer.put("EKF1", 41_000 + 100 * k, 1.0, 2.0, 30.0, 0.5, 0.0, 0.0, 0.05 * k, 0.0, -3.0, 0, 0, 0)
+    log = read(tmp_path, writer)
+    assert log.autopilot_name == "EKF1"
+    assert log.autopilot["pos_n_m"] == pytest.approx(0.05 * np.arange(100), abs=1e-5)
+
+
+def test_a_log_without_any_time_is_refused_for_that(tmp_path):
+    """ArduCopter 3.1 wrote ATT without one; that its LOG_BITMASK decides what it writes does not help there."""
+    writer = DataFlashWriter(units=False)
+    writer.define("ATT", "cccccCC", "RollIn,Roll,PitchIn,Pitch,YawIn,Yaw,NavYaw")
+    writer.put("ATT", 0, 1, 0, 2, 0, 3, 4)
+    said = complaint(tmp_path, writer)
+    assert said.endswith("ATT lacks a time (TimeUS or TimeMS): ArduPilot before 3.2 wrote none, give a later log")
+    assert "LOG_BITMASK" not in said
+
+
+def test_lines_of_a_text_that_are_no_messages_are_left_out(tmp_path, flight):
+    lines = as_text(old_dataflash_of(flight).content()).splitlines()
+    torn = [line for k, line in enumerate(lines) if k < 20 or k % 500]
+    broken = [f"{line[: len(line) // 3]}" for k, line in enumerate(lines) if k >= 20 and k % 500 == 0]
+    whole, part = (read(tmp_path, "\n".join(each).encode()) for each in (torn, [*torn, *broken, "ATT, 1, x, y", "?"]))
+    for sensor, stream in whole.streams.items():
+        assert np.array_equal(part.streams[sensor].t_s, stream.t_s), sensor
 
 
 # -- what is refused -----------------------------------------------------------------------------------------

@@ -65,7 +65,7 @@ def test_what_does_not_say_it_is_refused_in_one_line(tmp_path, kind, without):
         ("segment", 1.0, "segment that there is none"),
         ("segment", -1.0, "segment that there is none"),
         ("arrived", 0.5, "arrived that there is none"),
-        ("t_s", np.nan, "without a time"),
+        ("t_s", np.nan, "which no clock shows"),
         ("arrival_s", np.inf, "without a time"),
     ],
 )

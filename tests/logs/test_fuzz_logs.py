@@ -1,11 +1,13 @@
 """Damaged logs: a reader gives an InputError of one line or a sound Log, soon, in bounded memory, and nothing else.
 
-`make fuzz` runs 20 000 of them; FLOWNAV_FUZZ sets another number, FLOWNAV_FUZZ_FIRST the first seed. A failure names
-its seed: `damaged(sample, seed)` is the same bytes again.
+`make fuzz` runs 20 000 of them; FLOWNAV_FUZZ sets another number, FLOWNAV_FUZZ_FIRST the first seed, and
+FLOWNAV_FUZZ_FLIGHT_S how long the made flights are (1 s is read three times as fast). A failure names its seed:
+`damaged(sample, seed)` is the same bytes again.
 """
 
 from __future__ import annotations
 
+import os
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,9 +20,9 @@ from hypothesis import strategies as st
 
 from blackbox_logs import blackbox_log
 from blackbox_logs import quantised as box_tables
-from crazyflie_logs import deck_log
+from crazyflie_logs import deck_log, event_log
 from crazyflie_logs import quantised as deck_tables
-from dataflash_files import HEAD, DataFlashWriter, blank, dataflash_of
+from dataflash_files import HEAD, DataFlashWriter, as_text, blank, dataflash_of, old_dataflash_of
 from fed_records import queue_of_flight, record_of
 from flownav.core.errors import InputError
 from flownav.export.formats import export
@@ -64,8 +66,11 @@ class Sample:
         return path
 
 
+FLIGHT_S = float(os.environ.get("FLOWNAV_FUZZ_FLIGHT_S", "6"))
+
+
 def synthetic_flight() -> SyntheticLog:
-    return log_of_flight(6.0, imu_hz=25.0, attitude_hz=25.0)
+    return log_of_flight(FLIGHT_S, imu_hz=25.0, attitude_hz=25.0)
 
 
 def synthetic_dataflash() -> bytes:
@@ -96,14 +101,18 @@ def other_formats(folder: Path, flown: SyntheticLog) -> list[Sample]:
     record = record_of(queue_of_flight())
     record.add("estimate", {"t_s": np.arange(2.0), **{f"pos_{axis}_m": np.zeros(2) for axis in "ned"}})
     export(record, "mcap", folder / "ours.mcap")
-    deck = deck_log(deck_tables(flown.tables))
+    deck, events = (write(deck_tables(flown.tables)) for write in (deck_log, event_log))
     boxes = {name: blackbox_log(box_tables(flown.tables, inav), inav) for name, inav in BOXES.items()}
     return [
         Sample("ros mcap", ".mcap", {"": next(mcap.glob("*.mcap")).read_bytes()}, read_ros),
         Sample("px4 mcap", ".mcap", {"": next(px4.glob("*.mcap")).read_bytes()}, read_ros),
         Sample("ros sqlite", ".db3", {"": next(sqlite.glob("*.db3")).read_bytes()}, read_ros),
         Sample("our mcap", ".mcap", {"": (folder / "ours.mcap").read_bytes()}, read_ros),
+        Sample(
+            "ros 1 bag", ".bag", {"": ros_flight(flown.tables).write_ros_1(folder / "x.bag").read_bytes()}, read_ros
+        ),
         Sample("crazyflie", ".log", {"": deck.content()}, read_crazyflie),
+        Sample("crazyflie events", ".log", {"": events.content()}, read_crazyflie),
         *(Sample(name, ".bbl", {"": box.content()}, read_blackbox) for name, box in boxes.items()),
     ]
 
@@ -115,6 +124,7 @@ def samples(folder: Path) -> list[Sample]:
     found = [
         Sample("csv", "", {file.name: file.read_bytes() for file in sorted(csv.iterdir())}, read_csv_folder),
         Sample("dataflash", ".bin", {"": synthetic_dataflash()}, read_dataflash),
+        Sample("dataflash text", ".log", {"": as_text(old_dataflash_of(flown).content()).encode()}, read_dataflash),
         Sample("ulog", ".ulg", {"": ulog_of_flight(flown.tables).bytes()}, read_ulog),
         Sample("old ulog", ".ulg", {"": ulog_of_flight(flown.tables, old=True).bytes()}, read_ulog),
         Sample("tlog", ".tlog", {"": flight_log(6.0).content}, read_tlog),
@@ -142,8 +152,8 @@ REAL = {
     "real tlog": (".tlog", read_tlog, "mavlink/heli_sitl.tlog", 0, 600_000, 60_000),
 }
 BOXES = {"inav": True, "betaflight": False}
-NAMES = ("csv", "dataflash", "ulog", "old ulog", "tlog", "ros mcap", "px4 mcap", "ros sqlite", "our mcap", "crazyflie",
-         *BOXES, *REAL)  # fmt: skip
+NAMES = ("csv", "dataflash", "dataflash text", "ulog", "old ulog", "tlog", "ros mcap", "px4 mcap", "ros sqlite",
+         "our mcap", "ros 1 bag", "crazyflie", "crazyflie events", *BOXES, *REAL)  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -79,6 +79,17 @@ def test_every_sensor_reads_as_in_the_csv_folder(bags, folder, name):
     assert log.limits["range_m"] == pytest.approx((0.1, 12.0))
 
 
+def test_a_receiver_whose_bag_has_no_velocity_topic_has_no_velocity(flown, tmp_path):
+    """Not one that was heard and never fused, which ends a replay with a warning and status 1."""
+    made = ros_flight(flown.tables)
+    made.rows = [row for row in made.rows if "gps_vel" not in row[1]]
+    log = open_log(made.write(tmp_path / "mcap"))
+    assert Sensor.GPS_POSITION in log.streams
+    assert Sensor.GPS_VELOCITY not in log.streams
+    found = replay(log, ReplayOptions(), NavigatorSettingsFile()).findings
+    assert not any(each.unfused for each in found)
+
+
 @pytest.mark.parametrize("name", ["mcap file", "px4"])
 def test_the_replay_comes_out_as_that_of_the_csv_folder(bags, folder, flown, tmp_path, name):
     csv = folder
@@ -231,6 +242,41 @@ def test_a_bag_without_definitions_takes_those_of_ros_and_says_what_it_lacks(bag
     assert lacking in log.notes
 
 
+def test_what_a_damaged_bag_says_over_several_lines_is_said_in_one(bags, tmp_path):
+    """SQLite quotes the schema that it cannot read; a topic may be named anything."""
+    import sqlite3
+
+    file = tmp_path / "old.db3"
+    content = bags["sqlite file"].read_bytes()
+    schema = content.index(b"CREATE TABLE topics")
+    place = content.index(b"NOT NULL", schema)
+    file.write_bytes(content[:place] + b'"OT NULL' + content[place + 8 :])
+    with pytest.raises(InputError, match=r"no readable ROS 2 bag \(malformed database schema") as told:
+        open_log(file)
+    assert "\n" not in str(told.value)
+    named = content[:place].replace(b"tabletopicstopics", b"table\xdfopicstopics")  # what SQLite quotes is no text
+    file.write_bytes(named + b'"OT NULL' + content[place + 8 :])
+    with pytest.raises(InputError, match=r"no readable ROS 2 bag \(") as told:
+        open_log(file)
+    assert "\n" not in str(told.value)
+    file.write_bytes(content)
+    with sqlite3.connect(file) as base:
+        base.execute("UPDATE topics SET name = 'two' || char(10) || 'lines', type = 'a' || char(10) || 'b'")
+    with pytest.raises(InputError, match=r"the bag holds two lines \(a b\)$"):
+        open_log(file)
+
+
+def test_a_value_that_sqlite_has_no_memory_for_is_damage(bags, monkeypatch):
+    """Seed 401440: SQLite's module raises MemoryError, without a word, of a length that a flipped bit has made."""
+
+    def raises(base):
+        raise MemoryError
+
+    monkeypatch.setattr("flownav.logs.ros.bag._channels", raises)
+    with pytest.raises(InputError, match=r"no readable ROS 2 bag \(MemoryError\); give another log$"):
+        open_log(bags["sqlite file"])
+
+
 def test_what_holds_nothing_known_is_said_with_what_it_holds(tmp_path):
     made = BagMaker()
     made.put(0.0, "/chatter", "std_msgs/msg/String", made.kind("std_msgs/msg/String")(data="hello"))
@@ -249,22 +295,7 @@ def test_bags_are_known_by_their_first_bytes(tmp_path, name, head, kind):
 
 
 def test_a_ros_1_bag_is_read_too(flown, folder, tmp_path):
-    from rosbags.rosbag1 import Writer
-    from rosbags.typesys import Stores, get_typestore
-
-    made = ros_flight({name: flown.tables[name] for name in flown.tables})
-    store = get_typestore(Stores.ROS1_NOETIC)
-    kinds = {"sensor_msgs/msg/Imu", "sensor_msgs/msg/NavSatFix", "sensor_msgs/msg/Range"}
-    with Writer(tmp_path / "flight.bag") as writer:
-        connections = {}
-        for ns, topic, kind, message in sorted(made.rows, key=lambda row: row[0]):
-            if kind in kinds:
-                if topic not in connections:
-                    connections[topic] = writer.add_connection(topic, kind, typestore=store)
-                message.header = store.types["std_msgs/msg/Header"](
-                    seq=0, stamp=message.header.stamp, frame_id="base_link"
-                )
-                writer.write(connections[topic], ns, store.serialize_ros1(message, kind))
+    ros_flight({name: flown.tables[name] for name in flown.tables}).write_ros_1(tmp_path / "flight.bag")
     log, known = open_log(tmp_path / "flight.bag"), open_log(folder)
     for sensor in (Sensor.IMU, Sensor.ATTITUDE, Sensor.RANGE, Sensor.GPS_POSITION):
         assert largest_difference(log, known, sensor) < CLOSE[sensor], sensor
@@ -341,3 +372,33 @@ def test_info_says_which_topic_was_taken(flown, tmp_path):
     done = CliRunner().invoke(app, ["info", str(bag), "--json"])
     assert done.exit_code == 0, done.output
     assert any(note.startswith("imu is /mavros/imu/data") for note in json.loads(done.stdout)["notes"])
+
+
+def test_set_points_and_battery_of_a_bag(flown, truth, tmp_path):
+    made = ros_flight(flown.tables, truth)
+    plain = read_ros(made.write(tmp_path / "plain"))
+    for t_s, mask, east, north, up in ((1.0, 0, 2.0, 1.0, 3.0), (2.0, 4, 2.5, 1.5, 9.0)):
+        still = made.vector(0.0, 0.0, 0.0)
+        message = made.kind("mavros_msgs/msg/PositionTarget")(
+            header=made.header(t_s), coordinate_frame=1, type_mask=mask, position=made.vector(east, north, up, "Point"),
+            velocity=still, acceleration_or_force=still, yaw=0.0, yaw_rate=0.0,
+        )  # fmt: skip
+        made.put(t_s, "/mavros/setpoint_raw/target_local", "mavros_msgs/msg/PositionTarget", message)
+    nan, none = float("nan"), np.zeros(0, np.float32)
+    battery = made.kind("sensor_msgs/msg/BatteryState")(
+        header=made.header(3.0), voltage=15.5, temperature=nan, current=-8.0, charge=nan, capacity=nan,
+        design_capacity=nan, percentage=0.75, power_supply_status=0, power_supply_health=0, power_supply_technology=0,
+        present=True, cell_voltage=none, cell_temperature=none, location="", serial_number="",
+    )  # fmt: skip
+    made.put(3.0, "/mavros/battery", "sensor_msgs/msg/BatteryState", battery)
+    log = read_ros(made.write(tmp_path / "told"))
+    (place,) = log.setpoints
+    assert np.diff(place["t_s"]) == pytest.approx(1.0)
+    assert place["pos_n_m"].tolist() == [1.0, 1.5]
+    assert place["pos_e_m"].tolist() == [2.0, 2.5]
+    assert place["pos_d_m"][0] == -3.0
+    assert np.isnan(place["pos_d_m"][1])
+    assert (log.battery["voltage_v"].tolist(), log.battery["current_a"].tolist()) == ([15.5], [8.0])
+    assert log.battery["remaining_percent"].tolist() == [75.0]
+    assert (plain.setpoints, plain.battery) == ((), None)
+    assert log.span_s == plain.span_s

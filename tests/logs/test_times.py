@@ -61,9 +61,9 @@ def test_a_ulog_whose_clock_leaps_is_refused(flown, tmp_path):
 
 
 @pytest.mark.parametrize(("change", "words"), [
-    (lambda t: t * 1e13, "no clock shows that in seconds|the clock has leapt"),
-    (lambda t: np.where(t > 6.0, t + 1.8e13, t), "the clock has leapt"),
-    (lambda t: np.where(t > 6.0, np.nan, t), "a reading without a time"),
+    (lambda t: t * 1e13, "which no clock shows"),
+    (lambda t: np.where(t > 6.0, t + 1.8e13, t), "which no clock shows"),
+    (lambda t: np.where(t > 6.0, np.nan, t), "has the time nan s"),
 ])  # fmt: skip
 def test_a_record_of_absurd_times_is_refused(tmp_path, change, words):
     record = record_of(queue_of_flight())

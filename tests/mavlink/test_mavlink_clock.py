@@ -155,6 +155,19 @@ def test_another_clock_that_restarts_is_laid_anew():
     assert [a.t_s for a in other[2:]] == pytest.approx([10.3, 10.4, 10.5, 10.6, 10.7])
 
 
+@pytest.mark.parametrize("back_s", [0.3, 0.5, 1.9])
+def test_another_clock_that_is_set_back_a_little_is_laid_anew_within_seconds(back_s):
+    """NTP sets a companion's clock: its stamps are none that cannot be, and all of them were late for good."""
+    rows = []
+    for i in range(400):
+        t = 10.0 + 0.01 * i
+        rows += [(t, BOOT, t), (t + 0.003, OTHER, 500.0 + t - (back_s if i >= 100 else 0.0))]
+    found = times(rows)[1::2]
+    true = [10.003 + 0.01 * i for i in range(400)]
+    assert found[:100] == pytest.approx(true[:100], abs=1e-3)
+    assert found[250:] == pytest.approx(true[250:], abs=5e-3)
+
+
 def test_unix_stamps_and_system_time():
     waited = times([(10.0, BOOT, 10.0), (10.3, UNIX, UNIX_S)])
     assert waited == pytest.approx([10.0, 10.3])

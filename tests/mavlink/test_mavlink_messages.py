@@ -177,6 +177,12 @@ def test_no_magnetometer_is_no_field():
     assert set(readings(made("SCALED_IMU", zacc=-1000))) == {Sensor.IMU}
 
 
+@pytest.mark.parametrize("name", ["SCALED_IMU3", "RAW_IMU"])
+def test_six_zeros_are_no_imu(name):
+    """ArduPilot sends SCALED_IMU3 of a vehicle with two; taken for one, it served when the first was stuck."""
+    assert drops(made(name), ARDUPILOT) == [(Sensor.IMU, "no_data")]
+
+
 def test_attitude_and_its_quaternion_say_the_same():
     expected = [float(q) for q in quaternion_from_euler(0.3, -0.2, 2.0)]
     angles = readings(made("ATTITUDE", roll=0.3, pitch=-0.2, yaw=2.0))[Sensor.ATTITUDE].value

@@ -16,12 +16,12 @@ from flownav.core.frames import (
     to_earth,
     turned_about_down,
 )
+from flownav.core.measurement import Sensor
 from flownav.estimation.covariance import at
-from flownav.estimation.hypotheses import COUNT, HEADING_OFF, RANGE_OFFSET
+from flownav.estimation.hypotheses import HEADING_OFF, RANGE_OFFSET
 from flownav.estimation.laws.gps import gps_position, gps_velocity
 from flownav.estimation.named import Attitude, BodyRate, Lever
-from flownav.estimation.states import HYPOTHESES, POSITION, STATE, STATES
-from flownav.navigation.ahead import Carried, carried, coasted, state_at
+from flownav.estimation.states import HYPOTHESES, MOST_HYPOTHESES, POSITION, STATE, STATES
 from flownav.navigation.course import judge_course, with_flow, with_gps
 from flownav.navigation.flow_noise import (
     followed_agreement,
@@ -45,8 +45,9 @@ from flownav.navigation.motion_records import (
     StandMemory,
     SteadyForce,
 )
+from flownav.navigation.now import Carried, carried, coasted
 from flownav.navigation.place import judge_pad
-from flownav.navigation.protection import HELD_S, judge_suspicion, levels
+from flownav.navigation.protection import levels
 from flownav.navigation.reasons import FUSED
 from flownav.navigation.records import (
     FlowMemory,
@@ -59,12 +60,16 @@ from flownav.navigation.records import (
     StartMemory,
     SuspicionMemory,
 )
+from flownav.navigation.rings import Given, Rings, numbers_of
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.spikes import BURST_S, LONE_SHARE, MOST_DOUBT_M_S, doubt_of
-from flownav.navigation.still import GYRO_FLOOR_RAD_S, RESTS, SHAKEN, offer_bias, with_imu
+from flownav.navigation.still import GYRO_FLOOR_RAD_S, offer_bias
+from flownav.navigation.suspicion import HELD_S, judge_suspicion
 from flownav.navigation.tape import empty_tape
 from flownav.navigation.told import NO_HEADING, Equipment
-from flownav.navigation.verdicts import Force, Height
+from flownav.navigation.verdicts import AxisBias, Force, Height
+from flownav.navigation.waiting_records import Sizes
+from flownav.navigation.windows import RESTS, SHAKEN, with_imu
 
 SEEDS = pytest.mark.parametrize("seed", range(6))
 FITTED = Equipment(True, False, NO_HEADING, False, -math.inf)
@@ -150,15 +155,21 @@ def test_the_state_of_an_instant_hangs_on_no_later_reading_and_on_no_zero_of_tim
         on.work[MEMORY.row(ImuMemory, name)] = value
     on.work[CLOCK] = 8.0
     imu = np.column_stack([8.0 + 0.0625 * np.arange(1, 9), rng.normal(size=(8, 6))])
+
+    def told(imu, t_s, later_s=0.0):
+        rings, work = Rings(Sizes(16.0, 1.0, 0.0, 64.0), 1), on.work.copy()
+        work[CLOCK] += later_s
+        for row in imu:
+            rings.take(Given(row[0] + later_s, int(Sensor.IMU), numbers_of(row[1:])))
+        now = rings.now(work, on.settings, t_s + later_s)
+        return np.concatenate([now.pos_ned_m, now.vel_ned_m_s, now.quaternion, now.rate_frd_rad_s])
+
     for t_s in (8.125, 8.15, 8.25):
-        found = state_at(on.work, on.settings, imu, t_s)
+        found = told(imu, t_s)
         last = int(np.searchsorted(imu[:, 0], t_s)) + 1  # the first at or after it: what stands between the two
-        np.testing.assert_array_equal(state_at(on.work, on.settings, imu[:last], t_s)[:10], found[:10])
-        later = on.work.copy()
-        later[CLOCK] += LATER_S
-        shifted = imu + np.array([LATER_S, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-        np.testing.assert_allclose(state_at(later, on.settings, shifted, t_s + LATER_S), found, rtol=1e-9, atol=1e-11)
-    before, after = (state_at(on.work, on.settings, imu, t_s) for t_s in (8.25 - 1e-7, 8.25 + 1e-7))
+        np.testing.assert_array_equal(told(imu[:last], t_s)[:10], found[:10])
+        np.testing.assert_allclose(told(imu, t_s, LATER_S), found, rtol=1e-9, atol=1e-11)
+    before, after = (told(imu, t_s) for t_s in (8.25 - 1e-7, 8.25 + 1e-7))
     np.testing.assert_allclose(after[:10], before[:10], atol=1e-5)  # no jump at a reading
 
 
@@ -185,7 +196,7 @@ def test_levels_are_the_same_whichever_way_north_is(seed):
         work[SCALE_DOUBT], work[HYPOTHESES] = doubt, faults
         return levels(work, ONE_LANE, 0)
 
-    for doubt, faults in ((0.1, 0.0), (0.0, COUNT), (0.1, COUNT)):
+    for doubt, faults in ((0.1, 0.0), (0.0, MOST_HYPOTHESES), (0.1, MOST_HYPOTHESES)):
         found = level(0.0, doubt=doubt, faults=faults)
         for angle in (0.5 * math.pi, 1.0, -2.0):
             assert level(angle, doubt=doubt, faults=faults) == pytest.approx(found, rel=1e-9)
@@ -254,8 +265,8 @@ def test_no_verdict_hangs_on_the_zero_of_time():
             if since_s > t_s:
                 continue
             shifted, T = since_s + LATER_S, t_s + LATER_S
-            one, m = judge_rejections(True, False, t_s, RejectionMemory(7.0, since_s), TOLD.gps)
-            other, after = judge_rejections(True, False, T, RejectionMemory(7.0, shifted), TOLD.gps)
+            one, m = judge_rejections(2.0, True, False, t_s, RejectionMemory(7.0, since_s), TOLD.gps)
+            other, after = judge_rejections(2.0, True, False, T, RejectionMemory(7.0, shifted), TOLD.gps)
             assert (one, m._replace(since_s=m.since_s + LATER_S)) == (other, after)
             suspected = [
                 judge_suspicion(SuspicionMemory(2.0, since, since, 3.0), 1.0, 4, False, 0.5, 0.9, now)
@@ -366,12 +377,26 @@ def test_a_mean_of_more_readings_is_surer():
         values = 0.005 * (values - values.mean()) / values.std()
         for value in values:
             window = with_imu(Reading(0.01 + float(value), arrived=1.0), window)
-        offers[count] = offer_bias.law(StartMemory(started=1.0), window, SeenWindow(), StandMemory(does=RESTS), axis=0)
+        offers[count] = offer_bias.law(
+            StartMemory(started=1.0),
+            window,
+            SeenWindow(),
+            StandMemory(does=RESTS),
+            AxisBias(0.01, 1e-4),
+            axis=0,
+        ).offer
         assert offers[count].measured == pytest.approx(0.01, rel=1e-9)
         assert offers[count].variance == pytest.approx(0.005**2 / count + GYRO_FLOOR_RAD_S**2, rel=1e-9)
         assert offers[count].reason == FUSED
     assert offers[100].variance < offers[25].variance
-    shaken = offer_bias.law(StartMemory(started=1.0), window, SeenWindow(), StandMemory(does=SHAKEN), axis=0)
+    shaken = offer_bias.law(
+        StartMemory(started=1.0),
+        window,
+        SeenWindow(),
+        StandMemory(does=SHAKEN),
+        AxisBias(0.01, 1e-4),
+        axis=0,
+    ).offer
     assert shaken.reason != FUSED  # no ground was seen below it
 
 
@@ -403,8 +428,13 @@ def test_north_may_be_anywhere_for_what_acceleration_does_to_a_receiver_and_eith
     assert squared_acceleration(SteadyForce(0.0, 0.0, -GRAVITY_M_S2)) == 0.0  # standing still
     assert squared_acceleration(SteadyForce(3.0, 4.0, -GRAVITY_M_S2 - 12.0)) == pytest.approx(13.0**2)
     told = NavigatorSettingsFile(gyro_noise_rad_s_rt_hz=0.01, gyro_scale_sigma=0.02)
-    assert turning_noise(-turn, told) == turning_noise(turn, told)
-    assert turning_noise(2.0 * turn, told) - 1e-4 == pytest.approx(SWING_S * (0.04 * turn) ** 2)
+    assert turning_noise(-turn, 0.0, told) == turning_noise(turn, 0.0, told)
+    assert turning_noise(2.0 * turn, 0.0, told) - 1e-4 == pytest.approx(SWING_S * (0.04 * turn) ** 2)
+    shown = turning_noise(2.0 * turn, 9e-4, told) - turning_noise(2.0 * turn, 0.0, told)  # its readings show more
+    assert shown == pytest.approx(8e-4)
+    tones = told.model_copy(update={"gyro_tones_rad_s_rt_hz": 0.01})
+    assert turning_noise(0.0, 9e-4, tones) == pytest.approx(8e-4)  # but for the tones that turn nothing
+    assert turning_noise(0.0, 1.5e-4, tones) == pytest.approx(1e-4)
 
 
 @SEEDS

@@ -36,6 +36,7 @@ from flownav.navigation.records import (
     HeadingMemory,
     LevelMemory,
     PadMemory,
+    RangeMemory,
     Reading,
     RejectionMemory,
     StartMemory,
@@ -77,10 +78,10 @@ REFUSED = verdicts.Tested(INNOVATION_GATE, 1e3, 1.0, 0.25)
 OFTEN = RejectionMemory(30.0, 0.0)
 
 
-def fate(tested=REFUSED, axis=1, position=True, flow=None, pad=0.0, arrived=1.0):
+def fate(tested=REFUSED, axis=1, position=True, flow=None, ranged=None, pad=0.0, arrived=1.0, often=OFTEN):
     return judge_fate.law(
         tested, reading(10.0, 20.0, 30.0, arrived=arrived), AlongAxis(2.0, 3.0, 0.5, 0.04), flow or FlowMemory(),
-        FixMemory(OFTEN, GpsMemory(moved_n_m=1.0, moved_e_m=2.0), PadMemory(pad)), t_s=99.0,
+        ranged or RangeMemory(), FixMemory(often, GpsMemory(moved_n_m=1.0, moved_e_m=2.0), PadMemory(pad)), t_s=99.0,
         place=axis if position else 3 + axis, s=TOLD.gps,
     )  # fmt: skip
 
@@ -101,6 +102,19 @@ def test_a_velocity_that_is_refused_for_long_goes_to_the_fix_and_moves_no_positi
     assert found.goes[2].variance == pytest.approx(TOLD.gps.gps_velocity_sigma_down_m_s**2 + 0.25)
     assert found.told == (GPS_RESET, 27.0)
     assert (found.memory.gps.moved_n_m, found.memory.gps.moved_e_m) == (1.0, 2.0)
+
+
+@pytest.mark.parametrize("position", [True, False])
+def test_what_leapt_along_down_is_not_followed_while_the_range_holds_the_height(position):
+    """A range that is refused too holds nothing, and neither does flow; what crept, and is a velocity, is followed."""
+    leapt = RejectionMemory(30.0, 80.0, 79.0, 1.0)
+    held, refused = RangeMemory(taken_s=98.9), RangeMemory(taken_s=98.9, refused_s=90.0)
+    assert placed(fate(axis=2, position=position, ranged=held, often=leapt).goes) == []
+    assert placed(fate(axis=2, position=position, ranged=refused, often=leapt).goes)
+    assert placed(fate(axis=2, position=position, flow=FlowMemory(taken_s=98.9), often=leapt).goes)
+    assert placed(fate(axis=1, position=position, ranged=held, often=leapt).goes)
+    crept = leapt._replace(leapt=0.0)
+    assert bool(placed(fate(axis=2, position=position, ranged=held, often=crept).goes)) != position
 
 
 def test_an_axis_that_is_refused_for_the_others_sake_alone_does_not_count():
@@ -177,29 +191,28 @@ def test_a_pad_that_a_camera_sees_first_is_found_where_it_is():
         assert (again.pad, placed(again.place), again.found.kind) == (other, [], -1)
 
 
-def test_the_law_of_a_pad_fix_reads_all_of_it():
-    judged = judge_sight.law(
-        reading(0.1, -0.2, 4.0), RUNS, VelocityNed(0.0, 0.0, 0.0), ImuMemory(), component=1, s=TOLD.place
-    )
+def test_the_law_of_a_pad_fix_reads_all_of_it_and_what_one_component_refuses_none_is_fused_of():
+    seen = (reading(0.1, -0.2, 4.0), RUNS, VelocityNed(0.0, 0.0, 0.0), ImuMemory())
+    judged = judge_sight.law(*seen, LevelMemory(0.9), component=1, alone=False, s=TOLD.place)
     assert (judged.offer.measured, judged.offer.reason, judged.sight) == (-0.2, FUSED, (0.1, -0.2, 4.0))
+    for component in range(3):
+        apart = judge_sight.law(*seen, LevelMemory(1.1), component=component, alone=False, s=TOLD.place)
+        alone = judge_sight.law(*seen, LevelMemory(1.1), component=component, alone=True, s=TOLD.place)
+        assert (apart.offer.reason, alone.offer.reason) == (INNOVATION_GATE, FUSED)
 
 
 def test_a_pad_that_is_seen_elsewhere_again_and_again_is_not_where_it_was_seen_first():
     m = PadMemory(SEEN)
-    for k in range(int(MANY_STRAYS)):
+    for _ in range(int(MANY_STRAYS)):
         assert m.known == SEEN
-        m = count_refusals.law(Fate(INNOVATION_GATE), m, component=k % 2)
-    assert m == PadMemory(LEFT, 0.0, 0.0)
+        m = count_refusals.law(Fate(INNOVATION_GATE), m)
+    assert m == PadMemory(LEFT, 0.0)
 
 
-def test_a_whole_fix_ends_the_count_and_half_of_one_does_not():
+def test_a_fix_that_is_fused_ends_the_count_and_one_that_is_not_there_does_not():
     m = PadMemory(SEEN, 3.0)
-    half = count_refusals.law(Fate(FUSED), m, component=0)
-    assert half.refusals == 3.0
-    assert count_refusals.law(Fate(FUSED), half, component=1).refusals == 0.0
-    first = count_refusals.law(Fate(INNOVATION_GATE), m, component=0)
-    assert (first.refusals, first.first_refused) == (4.0, 1.0)
-    assert count_refusals.law(Fate(FUSED), first, component=1) == PadMemory(SEEN, 4.0, 0.0)
+    assert count_refusals.law(Fate(FUSED), m).refusals == 0.0
+    assert count_refusals.law(Fate(SILENT), m).refusals == 3.0
 
 
 @pytest.mark.parametrize(("known", "off_m", "landed", "after", "moves", "stands"), [
@@ -268,7 +281,15 @@ STANDS = StartMemory(force_z=-9.80665, readings=20.0)
 
 def begun(m=STANDS, sensor=Sensor.GPS_POSITION, fitted=FITTED, values=(1.0, 2.0, -3.0)):
     return start_lanes.law(
-        reading(*values), m, AidMemory(flag=2.0), HeadingMemory(), t_s=5.0, sensor=sensor, fitted=fitted, bias_sigma=0.1
+        reading(*values),
+        m,
+        AidMemory(flag=2.0),
+        HeadingMemory(),
+        t_s=5.0,
+        sensor=sensor,
+        fitted=fitted,
+        bias_sigma=0.1,
+        rectified=0.1,
     )
 
 

@@ -10,14 +10,14 @@ import pytest
 from flownav.core.compile import ONE_LANE
 from flownav.core.measurement import EventQueue, Sensor, merge
 from flownav.estimation.gating import Reason
-from flownav.estimation.states import FLOW_SCALE, GYRO_BIAS
+from flownav.estimation.states import ATTITUDE, FLOW_SCALE, GYRO_BIAS
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import run, start_navigator
 from flownav.navigation.memory import MEMORY
 from flownav.navigation.motion_records import StandMemory
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.still import MOVES, RESTS, SHAKEN
 from flownav.navigation.tape import new_tape
+from flownav.navigation.windows import MOVES, RESTS, SHAKEN
 from navigation_streams import FIELD_GAUSS, Flown, Navigated, body_axes, circle, fly, navigate, still
 
 load_stand, _ = MEMORY.access(StandMemory)
@@ -76,13 +76,13 @@ def test_a_vehicle_that_stands_6_s_with_a_biased_gyro_keeps_its_heading_for_30_s
 
 
 def test_one_whose_motors_run_meanwhile_is_known_to_stand_and_learns_the_gyro_s_bias_less_surely():
-    """0.05 rad/s of shaking at 200 Hz for 6 s: 0.0014 rad/s, and 2.6 deg in 30 s of flight."""
+    """A turn of 0.05 rad over the whole stand may be a slip on the floor: of the heading's bias little is learnt."""
     shaken = stood(motors=True)
     assert shaken.events("filter", "standing")[:, 1].tolist() == [SHAKEN, MOVES]
-    assert np.abs(shaken.yaw_error).max() < math.radians(6.0)  # 20 with the bias left in
-    learnt = shaken.column(GYRO_BIAS, 3)
-    assert learnt[np.searchsorted(shaken.t_s, STANDS_S)] == pytest.approx([0.004, -0.003, 0.01], abs=4e-3)
-    assert 2.15e-3 < shaken.sigma(GYRO_BIAS + 2) < 3e-3
+    assert np.abs(shaken.yaw_error).max() < 4.0 * shaken.sigma(ATTITUDE + 2)
+    learnt = shaken.column(GYRO_BIAS, 3)[np.searchsorted(shaken.t_s, STANDS_S)]
+    assert learnt[:2] == pytest.approx([0.004, -0.003], abs=3e-3)
+    assert 2e-3 < shaken.sigma(GYRO_BIAS + 2) <= NavigatorSettingsFile().gyro_bias_sigma_rad_s
     standing = (shaken.t_s > 2.0) & (shaken.t_s < STANDS_S)
     assert np.abs(shaken.velocity_error[standing]).max() < 0.1
 
@@ -134,10 +134,9 @@ def lying_on_all_axes_at_once() -> Navigated:
 def test_a_range_that_creeps_out_of_its_gate_makes_the_accelerometer_doubted_on_all_axes_and_no_new_ground():
     """3.0 m in height and 10.0 m level where it was a step of the ground, 20 m level where only down was doubted."""
     flown = lying_on_all_axes_at_once()
-    assert len(flown.events("imu", "doubted")) == 1
     assert len(flown.events("range", "reset")) == 0
-    assert np.abs(flown.error[:, 2] - flown.error[0, 2]).max() < 0.7
-    assert np.abs(flown.error[:, :2]).max() < 2.0
+    assert np.abs(flown.error[:, 2] - flown.error[0, 2]).max() < 0.2
+    assert np.abs(flown.error[:, :2]).max() < 0.3
 
 
 @pytest.mark.parametrize("slope_m_s", [0.02, 0.1, 0.3, 1.0])
@@ -267,4 +266,4 @@ def test_a_hover_that_a_low_range_takes_for_the_ground_teaches_no_gyro_and_holds
     found = navigate(flown.changed(Sensor.IMU, value=imu.value + shaking))
     assert SHAKEN in found.events("filter", "standing")[:, 1]
     assert np.isnan(load_stand(found.on.work, ONE_LANE, 0).contact_m)
-    assert found.sigma(GYRO_BIAS + 2) > 5e-3
+    assert found.sigma(GYRO_BIAS + 2) > 0.95 * NavigatorSettingsFile().gyro_bias_sigma_rad_s

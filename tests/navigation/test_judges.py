@@ -15,9 +15,9 @@ from flownav.navigation.attitude import read_attitude
 from flownav.navigation.baro import judge_baro
 from flownav.navigation.flow_judge import judge_look, turning_of
 from flownav.navigation.flow_noise import alike, flow_variance, followed_agreement, lasting_doubt, wrong_since
-from flownav.navigation.gps import LAG_LEFT, add_lag, follow_fix_noise, judge_fix, judge_rejections
+from flownav.navigation.gps import LAG_LEFT, LEAPT_RATIO, add_lag, follow_fix_noise, judge_fix, judge_rejections
 from flownav.navigation.heading import heading_variance, magnetic_heading
-from flownav.navigation.height import creeps, range_variance, range_verdict, repeats
+from flownav.navigation.height import range_variance, range_verdict, repeats
 from flownav.navigation.inertial import motion_between, said_by, sound
 from flownav.navigation.motion_records import ImuMemory, SteadyForce
 from flownav.navigation.place import judge_pad, judge_pose, late_variance
@@ -55,7 +55,7 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tape import BARO_FOUND
 from flownav.navigation.told import NO_HEADING as HEADLESS
 from flownav.navigation.told import Equipment
-from flownav.navigation.trust import OF_GPS
+from flownav.navigation.trust import CREEPING_M_S, OF_GPS, creeps
 from flownav.navigation.verdicts import Event, Height, Noise, Offer, Reset
 from flownav.navigation.verdicts import Tested as Outcome
 from flownav.navigation.vibration import followed_vibration, vibration_beyond, with_reading
@@ -130,7 +130,9 @@ def test_a_velocity_errs_by_what_a_receivers_lag_leaves_over_and_that_is_not_lea
             m = follow_fix_noise.law(tested, StartMemory(1.0), PUSHED, m, t_s=0.2 * i, place=place, s=s)
         return m.factor
 
-    assert followed(OF_GPS + 3) == followed(OF_GPS)  # of a velocity as of a place, which does not lag
+    assert followed(OF_GPS + 3) == pytest.approx(
+        followed(OF_GPS), rel=1e-12
+    )  # of a velocity as of a place, which does not lag
     assert followed(OF_GPS) == pytest.approx(1.0, abs=0.15)
     refused = Outcome(INNOVATION_GATE, 9.0, 0.05, 0.04)
     m = NoiseMemory()
@@ -161,21 +163,38 @@ def test_a_fix_that_jumps_along_one_axis_is_refused_along_both_and_keeps_its_hei
 def test_gps_is_believed_once_it_was_refused_often_and_for_long():
     m = RejectionMemory(0.0, 0.0)
     for t_s in (10.0, 10.3, 10.6, 10.9):  # a second will do where flow is doubted, and five refusals
-        reset, m = judge_rejections(True, True, t_s, m, TOLD.gps)
+        reset, m = judge_rejections(2.0, True, True, t_s, m, TOLD.gps)
         assert not reset
-    assert judge_rejections(True, True, 11.2, m, TOLD.gps)[0]
-    assert not judge_rejections(True, False, 11.2, m, TOLD.gps)[0]
+    assert judge_rejections(2.0, True, True, 11.2, m, TOLD.gps)[0]
+    assert not judge_rejections(2.0, True, False, 11.2, m, TOLD.gps)[0]
     m, times = RejectionMemory(0.0, 0.0), []
     for t_s in np.arange(10.0, 30.0, 0.5).tolist():
-        reset, m = judge_rejections(True, False, t_s, m, TOLD.gps)
+        reset, m = judge_rejections(2.0, True, False, t_s, m, TOLD.gps)
         times += [t_s] * reset
     assert times == [17.0, 24.5]  # 7 s each, and the count begins anew
     m = RejectionMemory(0.0, 0.0)
     for t_s in (10.0, 14.0, 17.5, 20.0):  # long, and not often
-        reset, m = judge_rejections(True, False, t_s, m, TOLD.gps)
+        reset, m = judge_rejections(2.0, True, False, t_s, m, TOLD.gps)
         assert not reset
-    assert judge_rejections(True, False, 21.0, m, TOLD.gps)[0]
-    assert judge_rejections(False, False, 21.0, m, TOLD.gps) == (False, RejectionMemory(0.0, 10.0))
+    assert judge_rejections(2.0, True, False, 21.0, m, TOLD.gps)[0]
+    assert judge_rejections(0.0, True, False, 21.0, m, TOLD.gps) == (False, RejectionMemory(0.0, 10.0))
+
+
+def test_a_velocity_that_leapt_out_of_its_gate_is_not_followed_while_flow_holds():
+    """One that jumps is the receiver's; one that creeps out may be led away by a flow of the wrong sign."""
+    for first, followed in ((1.5, True), (2.0 * LEAPT_RATIO, False)):
+        m, resets = RejectionMemory(0.0, 0.0, 9.8), []
+        for t_s in np.arange(10.0, 13.0, 0.2).tolist():
+            ratio = first if t_s == 10.0 else 50.0
+            reset, m = judge_rejections(ratio, False, False, t_s, m, TOLD.gps, seen=True)
+            resets.append(reset)
+        assert any(resets) == followed
+    m = RejectionMemory(0.0, 0.0, 5.0)  # a receiver that was silent before tells news
+    resets = []
+    for t_s in np.arange(10.0, 11.5, 0.2).tolist():
+        reset, m = judge_rejections(50.0, False, False, t_s, m, TOLD.gps, seen=True)
+        resets.append(reset)
+    assert any(resets)
 
 
 # -- flow ----------------------------------------------------------------------------------------------------
@@ -282,7 +301,15 @@ def test_a_range_states_its_variance_or_has_a_floor_and_a_share():
 
 
 def range_memory(**parts) -> RangeMemory:
-    empty = {"taken_s": -math.inf, "refused_s": NAN, "last_m": NAN, "same_s": NAN, "down_m": 0.0, "said_s": NAN}
+    empty = {
+        "taken_s": -math.inf,
+        "tested_s": -math.inf,
+        "refused_s": NAN,
+        "last_m": NAN,
+        "same_s": NAN,
+        "down_m": 0.0,
+        "said_s": NAN,
+    }
     return RangeMemory(**{name: 0.0 for name in RangeMemory._fields} | empty | parts)
 
 
@@ -296,7 +323,10 @@ def range_memory(**parts) -> RangeMemory:
 @pytest.mark.parametrize("sigma_m", [0.02, 1.0])
 def test_a_range_creeps_out_of_its_gate_or_jumps(before, refused, crept, sigma_m):
     tested = Outcome(INNOVATION_GATE, refused * sigma_m, sigma_m**2, 0.5 * sigma_m**2)
-    assert creeps(tested, range_memory(sigmas=before), 5.0) == crept
+    m = range_memory(sigmas=before, taken_s=0.0)
+    assert creeps(tested, 1e3, m, 5.0) == crept
+    slow = creeps(tested._replace(variance=0.0), 0.9 * abs(refused) * sigma_m / CREEPING_M_S, m, 5.0)
+    assert not slow  # nothing that moves leaves its gate so fast
 
 
 @pytest.mark.parametrize(("range_m", "upright", "reason"), [

@@ -10,7 +10,6 @@ import pytest
 from flownav.core.compile import LANES, LANES_WIDE
 from flownav.core.frames import GRAVITY_M_S2
 from flownav.core.measurement import MAX_VALUES, EventQueue, Sensor, Stream, merge
-from flownav.estimation.consistency import unpack
 from flownav.estimation.states import QUATERNION, STATE, STATES
 from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.memory import READING, load_start, new_work
@@ -22,6 +21,7 @@ from flownav.navigation.take import navigate_lanes
 from flownav.navigation.tape import COMPONENTS, EVENT_NAMES, Tape, empty_tape, new_tape, room_of
 from flownav.navigation.told import FROM_ATTITUDE, FROM_MAG, NO_HEADING, Equipment
 from navigation_streams import circle, fly
+from packed_covariance import unpack
 
 STATED = Reading._fields.index("quality") - MAX_VALUES
 SETTINGS = NavigatorSettingsFile(

@@ -128,6 +128,18 @@ def test_zero_velocity_on_the_ground_holds_the_place():
     assert np.abs(flying.error[-1, :2]).max() > 2.0
 
 
+@pytest.mark.parametrize(("without", "m_s"), [((), 0.75), ((Sensor.RANGE, Sensor.FLOW_RATE), 1.5), (GPS, 0.75)])
+def test_landed_that_is_said_in_flight_is_refused_by_what_says_that_it_flies(without, m_s):
+    """5 m up: by range, flow and GPS together, by GPS alone, and without it."""
+    flown = fly(lambda t: np.column_stack([0.0 * t, m_s * t, 0.0 * t - 5.0]), 20.0).without(*without)
+    t_s = np.arange(8.0, 14.0, 0.2)
+    lied, honest = navigate(flown.added(Stream.of(Sensor.LANDED, t_s, np.ones((len(t_s), 1))))), navigate(flown)
+    for axis in range(2):
+        beside = np.interp(lied.t_s, honest.t_s, honest.error[:, axis])
+        assert np.abs(lied.error[:, axis] - beside).max() < 0.05
+    assert set(lied.reasons(Sensor.LANDED)) == {"innovation_gate"}
+
+
 def test_pad_fixes_pull_the_position_to_centimetres():
     """GPS is half a metre off; the pad's place is a state, and from it the vehicle's place is known to centimetres."""
     flown = fly(still, 30.0).without(Sensor.FLOW_RATE, Sensor.BARO)

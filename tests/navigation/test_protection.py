@@ -19,6 +19,7 @@ from flownav.estimation.hypotheses import (
     HEADING_OFF,
     NAMES,
     RANGE_OFFSET,
+    TURNING,
     begin_lane_anew,
     effect_of,
     larger_axis,
@@ -29,18 +30,21 @@ from flownav.estimation.states import (
     GROUND,
     HYPOTHESES,
     INFORMATION,
+    MOST_HYPOTHESES,
     POSITION,
     SCORE,
     STATE,
     STATES,
     VELOCITY,
 )
+from flownav.navigation.fault_sizes import least_size, prior_sigma
 from flownav.navigation.flags import Flag, flagged, flags_of
 from flownav.navigation.loop import run, start_navigator
-from flownav.navigation.protection import EXCLUDED_SIGMAS, HELD_S, least_size, levels, prior_sigma
+from flownav.navigation.protection import levels
 from flownav.navigation.rows import EstimateRow
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.smoother import part_of
+from flownav.navigation.suspicion import EXCLUDED_SIGMAS, HELD_S
 from flownav.navigation.tape import (
     AIDED_AGAIN,
     DEAD_RECKONING,
@@ -95,6 +99,9 @@ def begun_anew(flown: Flown, at_s: float, faults: range) -> Navigated:
         (RANGE_OFFSET, Sensor.RANGE, [TINY], [POSITION + 2, GROUND], ()),
         (FORCE, Sensor.IMU, [0.0, 0.0, 0.0, TINY], [VELOCITY, VELOCITY + 1], QUIET),
         (FORCE + 1, Sensor.IMU, [0.0, 0.0, 0.0, 0.0, TINY], [VELOCITY, VELOCITY + 1], QUIET),
+        (FORCE + 2, Sensor.IMU, [0.0, 0.0, 0.0, 0.0, 0.0, TINY], [VELOCITY + 2, POSITION + 2], QUIET),
+        (TURNING, Sensor.IMU, [TINY], [VELOCITY, VELOCITY + 1], QUIET),
+        (TURNING + 1, Sensor.IMU, [0.0, TINY], [VELOCITY, VELOCITY + 1], QUIET),
     ],
 )
 def test_an_effect_is_what_a_small_fault_does_to_the_estimate(fault, sensor, offset, states, without):
@@ -106,7 +113,8 @@ def test_an_effect_is_what_a_small_fault_does_to_the_estimate(fault, sensor, off
     expected = np.array([-effect_of(right.on.work, ONE_LANE, STATES, fault, state, 0) for state in states])
     largest = np.abs(expected).max()
     assert largest > 1e-3
-    np.testing.assert_allclose(moved, expected, atol=0.1 * largest)
+    learnt = 0.2 if FORCE <= fault < TURNING else 0.1  # what the filter learns of the bias in 4 s is left out
+    np.testing.assert_allclose(moved, expected, atol=learnt * largest)
 
 
 def test_following_faults_changes_no_bit_of_the_estimate():
@@ -119,7 +127,7 @@ def test_following_faults_changes_no_bit_of_the_estimate():
     alone = EstimateRow.of(on.tape.estimates())
     assert all(getattr(alone, name).tobytes() == getattr(followed.said, name).tobytes() for name in UNPROTECTED)
     assert on.tape.offers().tobytes() == followed.offers.tobytes()
-    assert followed.on.work[HYPOTHESES] == COUNT
+    assert followed.on.work[HYPOTHESES] == MOST_HYPOTHESES
 
 
 # -- sizes ------------------------------------------------------------------------------------------------------
@@ -200,7 +208,12 @@ def test_a_flight_without_faults_raises_no_suspicion_and_has_levels_of_use(senso
 
 
 def test_a_reversed_flow_is_suspected_by_name_and_the_suspicion_lasts():
-    found = navigate(scaled(noisy(FLOWN), [[-1, 0], [0, -1]], 12.0).only(*OWN))
+    """By an accelerometer of 0.05 m/s2/rt(Hz); by one of twice that flow is doubted, and the levels hold."""
+    turned = scaled(noisy(FLOWN), [[-1, 0], [0, -1]], 12.0).only(*OWN)
+    found, plain = navigate(turned, accel_noise_m_s2_rt_hz=0.05), navigate(turned)
+    assert plain.events("flow", "doubted")[0, 0] == pytest.approx(12.2, abs=0.3)
+    off = np.hypot(*(plain.error - plain.error[0])[:, :2].T)
+    assert (off <= plain.said.protection_m[:, 0]).all()
     suspected = found.events("filter", "suspects")
     assert len(suspected)
     assert suspected[0, 0] == pytest.approx(12.5, abs=1.0)
@@ -223,10 +236,10 @@ def test_levels_by_hand():
     work = found.on.work.copy()
     work[HYPOTHESES] = 0.0
     own = levels(work, ONE_LANE, 0)
-    work[HYPOTHESES] = COUNT
+    work[HYPOTHESES] = MOST_HYPOTHESES
     assert levels(work, ONE_LANE, 0).horizontal_m >= own.horizontal_m
     sigma = found.sigma(POSITION + 2)
-    assert own.vertical_m == pytest.approx(4.0 * sigma)
+    assert own.vertical_m == pytest.approx(2.5 * sigma)
     assert found.sigma(ATTITUDE) > 0.0
 
 

@@ -9,9 +9,12 @@ import pytest
 
 from flownav.core.frames import GRAVITY_M_S2
 from flownav.navigation.flow_noise import flow_variance
+from flownav.navigation.motion_records import ImuMemory
+from flownav.navigation.records import Reading
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import noise_of, of_gps_receiver, of_inertial, of_magnetometer, settings_of
 from flownav.navigation.told import NO_HEADING, NO_STATED_NOISE, Equipment
+from flownav.navigation.vibration import followed_gyro_power, with_reading
 from flownav.sensors.datasheet import load_sensor
 from flownav.sensors.magnetometer import MagneticField, MagnetometerSheet
 from flownav.sensors.sheets import GpsReceiverSheet, InertialSheet, Tone, Vibration, shipped_sheets
@@ -104,6 +107,27 @@ def test_the_gyros_scale_is_told_with_its_alignment():
     changed = sheet.model_copy(update={"gyro": gyro})
     assert of_inertial(changed)["gyro_scale_sigma"] == pytest.approx(0.05)
     assert settings_of()[0].gyro_scale_sigma == 0.0
+
+
+@pytest.mark.parametrize("hz", [(23.0, 46.0), (31.0, 80.0)])  # the second is read at its alias
+def test_the_tones_of_a_gyro_are_taken_off_the_noise_that_its_readings_show(hz):
+    sheet = InertialSheet.read()
+    told = of_inertial(sheet, hz)["gyro_tones_rad_s_rt_hz"]
+    t_s = sheet.period_s * np.arange(4000)
+    shake = sheet.vibration
+    shown = sum(
+        ((1.0 + shake.spread) * math.radians(tone.tilt_deg_s) * sheet.left_of_tone(f))
+        * np.sin(2.0 * math.pi * f * t_s + 0.3)
+        for f, tone in zip(hz, (shake.rotor, shake.blades), strict=True)
+    )
+    m, powers = ImuMemory(), []
+    for now_s, rate in zip(t_s, shown, strict=True):
+        r = Reading(*(rate, rate, rate, 0.0, 0.0, 0.0))
+        power = followed_gyro_power(r, m, sheet.period_s)
+        m = with_reading(r, now_s, m)._replace(gyro_power=power)
+        powers.append(power)
+    assert np.mean(powers[1000:]) == pytest.approx(told**2, rel=0.05)
+    assert of_inertial(sheet)["gyro_tones_rad_s_rt_hz"] == 0.0
 
 
 def test_vibration_of_the_sheet_counts_as_noise_and_as_harmless():

@@ -15,11 +15,12 @@ from flownav.estimation.motion import predict
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, IMU, VELOCITY
 from flownav.navigation.before_start import felt, levelled
 from flownav.navigation.records import Reading, StartMemory
+from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.navigation.settings_of import RECTIFIED_SHARE
 from flownav.navigation.start import (
     HOVERING_M_S2,
     LEVELLED_FLOOR_RAD,
     LEVELLING_S,
-    RECTIFIED_SHARE,
     STANDING_TILT_RAD,
     level,
     levelling,
@@ -121,9 +122,9 @@ def started(shaking_m_s2: float, roll: float) -> Navigated:
     return navigate(flown.changed(Sensor.IMU, value=imu).cut(Sensor.FLOW_RATE, 0.0, 0.5).without(Sensor.RANGE))
 
 
-def doubts_of(shaking_m_s2: float, readings: int) -> tuple[float, float]:
+def doubts_of(shaking_m_s2: float, readings: int, rectified: float = RECTIFIED_SHARE) -> tuple[float, float]:
     """The variance of what lasts in a mean force and of what its readings leave [m2/s4]."""
-    lasting = 0.2**2 + (RECTIFIED_SHARE * shaking_m_s2) ** 2  # `accel_bias_sigma_m_s2`
+    lasting = 0.2**2 + (rectified * shaking_m_s2) ** 2  # `accel_bias_sigma_m_s2`
     return lasting, HOVERING_M_S2**2 + shaking_m_s2**2 / readings
 
 
@@ -137,7 +138,7 @@ def test_the_start_is_the_posterior_of_a_tilt_a_bias_and_a_noise(shaking_m_s2):
     cross = prior @ jacobian
     total = jacobian @ cross + noise
     mean, after = cross / total * 0.7, prior - np.outer(cross, cross) / total
-    found = levelling(m, 0.2, False, False)
+    found = levelling(m, 0.2, RECTIFIED_SHARE, False, False)
     assert found.believed * 0.7 / GRAVITY_M_S2 == pytest.approx(mean[0], rel=1e-12)
     assert found.bias_x == pytest.approx(mean[1], rel=1e-12)
     assert found.bias_variance == pytest.approx(after[1, 1], rel=1e-12)
@@ -148,7 +149,7 @@ def test_the_start_is_the_posterior_of_a_tilt_a_bias_and_a_noise(shaking_m_s2):
 @pytest.mark.parametrize("yaw", [0.0, 0.9, math.pi, -2.0])
 def test_a_levelled_vehicle_knows_its_acceleration_better_than_its_tilt_or_its_bias(yaw):
     """Tilt and bias are tied by the signs with which both enter the motion, however the vehicle heads."""
-    found = levelling(EMPTY._replace(readings=100.0), 0.2, False, False)
+    found = levelling(EMPTY._replace(readings=100.0), 0.2, RECTIFIED_SHARE, False, False)
     filter_ = Filter()
     filter_.q[:] = quaternion_from_euler(0.0, 0.0, yaw)
     filter_.rows(IMU, 6)[5] = -GRAVITY_M_S2
@@ -184,7 +185,9 @@ def test_the_noise_of_a_mean_falls_with_its_readings_down_to_how_a_hover_acceler
 def test_a_vehicle_on_a_slope_starts_aslant_and_what_is_left_covers_the_truth(shaking_m_s2):
     roll = 0.1
     run = started(shaking_m_s2, roll)
-    lasting, noise = doubts_of(shaking_m_s2, 100 if shaking_m_s2 == 3.0 else 50)
+    lasting, noise = doubts_of(
+        shaking_m_s2, 100 if shaking_m_s2 == 3.0 else 50, NavigatorSettingsFile().vibration_rectified_share
+    )
     tilted = (GRAVITY_M_S2 * STANDING_TILT_RAD) ** 2
     believed = tilted / (tilted + lasting + noise)
     first = run.said

@@ -8,16 +8,36 @@ import numpy as np
 import pytest
 
 from flownav.core.compile import ONE_LANE
+from flownav.navigation.attitude import AttitudeVariance
 from flownav.navigation.memory import MEMORY, STILL_CLOCK, new_work, set_lane, store_reading
-from flownav.navigation.motion_records import ImuWindow, SeenWindow
-from flownav.navigation.records import Reading
+from flownav.navigation.motion_records import ImuMemory, ImuWindow, SeenWindow, StandMemory
+from flownav.navigation.reasons import FUSED, SILENT
+from flownav.navigation.records import Reading, StartMemory
+from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.still import (
+    GYRO_FLOOR_RAD_S,
+    HOLD_S,
+    SETTLE_RAD,
+    SLIDING_SIGMA_M_S,
+    SLIP_RAD,
+    WINDOW_S,
+    offer_bias,
+    offer_rest,
+    stand_turning,
+)
+from flownav.navigation.told import NO_HEADING, Equipment
+from flownav.navigation.usual import LOST_TILT_RAD, USUAL_TILT_RAD, offer_level
+from flownav.navigation.verdicts import AxisBias, AxisVelocity
+from flownav.navigation.windows import (
     CONTACT_M,
     MOVES,
     QUIET_ACCEL_M_S2,
     QUIET_GYRO_RAD_S,
     RESTS,
     SHAKEN,
+    SPAN_SIGMAS,
+    STEADY_RANGE_M,
+    is_steady,
     judge_standing,
     open_windows,
     spreads,
@@ -34,8 +54,8 @@ load_seen_window, _ = MEMORY.access(SeenWindow)
 
 NAN = math.nan
 EMPTY = ImuWindow(*[0.0] * len(ImuWindow._fields))
-UNSEEN = SeenWindow(1e9, -1.0, 0.0, 0.0, 0.0, 0.0)
-GROUNDED = SeenWindow(0.20, 0.21, 0.0, 0.0, 10.0, 0.0)
+UNSEEN = SeenWindow()
+GROUNDED = SeenWindow(0.20, 0.21, flows=10.0)
 BIAS = np.array([0.01, -0.01, 0.02])  # of a gyro [rad/s]
 GRAVITY = np.array([0.3, -0.2, -9.8])
 
@@ -84,7 +104,8 @@ def test_the_span_of_ranges():
     for range_m in (0.5, 0.2, 0.3):
         m = with_range(range_m, m)
     assert (m.range_low_m, m.range_high_m) == (0.2, 0.5)
-    assert m[2:] == UNSEEN[2:]
+    assert (m.range_m, m.ranges, m.range_jumps) == (0.3, 3.0, pytest.approx(0.3**2 + 0.1**2))
+    assert m[5:] == UNSEEN[5:]
 
 
 # -- verdicts ------------------------------------------------------------------------------------------------
@@ -139,6 +160,97 @@ def test_one_whose_motors_run_stands_where_its_range_is_steady_at_contact_and_it
 def test_a_quiet_imu_is_not_believed_against_a_height_or_a_speed(seen):
     """A glider, a balloon, a vehicle that another carries."""
     assert judge_standing(QUIET, seen, NAN) == MOVES
+
+
+# -- where no range is heard ---------------------------------------------------------------------------------------
+@pytest.mark.parametrize(("gyro", "last_m", "does"), [
+    (QUIET, NAN, RESTS),
+    (QUIET, 0.2, RESTS),  # the ground was there
+    (QUIET, 3.0, MOVES),  # a hover above what its range reaches
+    (LOUD, 0.2, SHAKEN),
+    (LOUD, 3.0, MOVES),
+    (LOUD, NAN, MOVES),
+])  # fmt: skip
+def test_where_no_range_is_heard_the_last_one_tells_whether_the_ground_is_there(gyro, last_m, does):
+    seen = UNSEEN._replace(flows=10.0, flow_u_m_s=0.5)
+    assert judge_standing(gyro, seen, NAN, last_m) == does
+
+
+def test_ranges_of_one_height_are_steady_whatever_their_noise_and_those_of_a_climb_are_not():
+    noise = np.random.default_rng(2).normal(0.0, 0.02, 25)
+    for rise_m, steady in ((0.0, True), (0.3, False)):
+        m = UNSEEN
+        for k, error_m in enumerate(noise):
+            m = with_range(0.3 + rise_m * k / len(noise) + error_m, m)
+        assert m.range_high_m - m.range_low_m > STEADY_RANGE_M
+        assert bool(is_steady(m)) is steady, rise_m
+    assert np.ptp(noise) / noise.std() - STEADY_RANGE_M / noise.std() < SPAN_SIGMAS
+
+
+# -- what a stand teaches ------------------------------------------------------------------------------------------
+PLACE = NavigatorSettingsFile().settings(Equipment(True, False, NO_HEADING, False, -math.inf)).place
+RUNS, STILL_AT_5_CM = StartMemory(started=1.0), UNSEEN._replace(range_low_m=0.05, range_high_m=0.05)
+CALM = AxisVelocity(0.0, 0.01)
+
+
+def rest(does: float, seen: SeenWindow = STILL_AT_5_CM, velocity: AxisVelocity = CALM, axis: int = 0):
+    return offer_rest.law(RUNS, seen, StandMemory(does, 0.05), velocity, ImuMemory(), axis=axis, s=PLACE)
+
+
+def test_a_stand_is_worth_as_much_however_often_it_is_held():
+    assert rest(RESTS).offer.variance == pytest.approx(PLACE.still_sigma_m_s**2 * WINDOW_S / HOLD_S)
+
+
+def test_who_has_the_ground_below_slides_at_most_and_who_has_not_is_offered_nothing():
+    sliding = rest(MOVES)
+    assert sliding.offer.reason == FUSED
+    assert sliding.offer.variance == pytest.approx(SLIDING_SIGMA_M_S**2 * WINDOW_S / HOLD_S)
+    assert rest(MOVES, STILL_AT_5_CM._replace(range_high_m=0.2)).offer.reason == SILENT
+    lifted = rest(RESTS, STILL_AT_5_CM._replace(range_high_m=0.5))  # a range contradicts what stood
+    assert lifted.offer.reason == SILENT
+    assert rest(RESTS, UNSEEN._replace(gps_m_s=2.0)).offer.reason == SILENT
+
+
+def test_a_velocity_that_standing_contradicts_is_freed_and_the_accelerometer_that_made_it_is_doubted():
+    fast = rest(RESTS, velocity=AxisVelocity(3.0, 0.01))
+    assert fast.velocity.variance == 9.0
+    assert fast.accel[0].variance == pytest.approx((3.0 / HOLD_S) ** 2)
+    assert fast.imu.doubt_m_s2 > 0.0
+    calm = rest(RESTS)
+    assert (calm.velocity.variance, calm.accel[0].variance, calm.imu.doubt_m_s2) == (0.0, 0.0, 0.0)
+    in_the_air = rest(SHAKEN, STILL_AT_5_CM._replace(range_high_m=0.3, range_low_m=0.3), AxisVelocity(3.0, 0.01))
+    assert in_the_air.velocity.variance == 0.0
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_windows_of_a_stand_add_up_to_one_bound_on_what_it_turned(axis):
+    bound = SLIP_RAD if axis == 2 else SETTLE_RAD
+    for count in (1, 4, 60):
+        told = sum(1.0 / stand_turning(float(n), axis) for n in range(1, count + 1))
+        assert 1.0 / math.sqrt(told) == pytest.approx(bound / (count * WINDOW_S))
+
+
+def taught(does: float, bias: AxisBias, windows: float = 4.0):
+    m = StandMemory(does, 0.05, windows=windows)
+    return offer_bias.law(RUNS, QUIET, STILL_AT_5_CM, m, bias, axis=2)
+
+
+def test_a_bias_is_opened_by_a_real_rest_only():
+    wrong = AxisBias(-0.3, 1e-6)
+    at_rest, shaken = taught(RESTS, wrong), taught(SHAKEN, wrong)
+    assert at_rest.opened.variance == pytest.approx((BIAS[2] - wrong.rad_s) ** 2)
+    assert shaken.opened.variance == 0.0
+    assert taught(RESTS, AxisBias(BIAS[2], 1e-6)).opened.variance == 0.0
+    assert at_rest.offer.variance < 2.0 * GYRO_FLOOR_RAD_S**2 < shaken.offer.variance
+
+
+# -- what is usual -------------------------------------------------------------------------------------------------
+def test_who_does_not_know_their_tilt_is_level_more_or_less_and_who_does_keeps_it():
+    known = AttitudeVariance(*[0.0] * len(AttitudeVariance._fields))
+    lost = known._replace(about_n=0.6 * LOST_TILT_RAD**2, about_e=0.6 * LOST_TILT_RAD**2)
+    assert offer_level.law(RUNS, lost)[:3] == (0.0, USUAL_TILT_RAD**2, FUSED)
+    assert offer_level.law(RUNS, known).reason == SILENT
+    assert offer_level.law(StartMemory(), lost).reason == SILENT
 
 
 # -- what is watched -----------------------------------------------------------------------------------------

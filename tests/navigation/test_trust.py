@@ -17,10 +17,12 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.told import NO_HEADING, Equipment
 from flownav.navigation.trust import (
     FACTOR_PACE,
+    FIRST_READINGS,
     LARGEST_FACTOR,
     LARGEST_NOISE,
     LEAST_FACTOR,
     LIKENESS_ALLOWED,
+    NOISE_TIME_S,
     OF_BARO,
     OF_RANGE,
     SMALLEST_NOISE,
@@ -39,6 +41,7 @@ _, store_whiteness = MEMORY.access(WhitenessMemory)
 load_noise, store_noise = MEMORY.access(NoiseMemory)
 
 TOLD = NavigatorSettingsFile().settings(Equipment(True, False, NO_HEADING, False, -math.inf))
+KNOWN = 1e6  # readings, after which one counts by time alone
 FRESH = WhitenessMemory(0.0, 0.0, 0.0, 0.0, 1.0, -math.inf)
 
 
@@ -162,15 +165,20 @@ def test_a_noise_goes_to_the_variance_of_what_changes_from_reading_to_reading(ti
     assert follow(white + slow, 0.04) == pytest.approx(times, rel=0.15)
 
 
+def test_the_first_readings_teach_a_noise_sooner():
+    sooner, later = (followed_noise(0.9, 9.0, 0.5, 0.02, 5.0, 5.2, NoiseMemory(2.0, 0.3, 5.0, n)) for n in (0.0, KNOWN))
+    assert (sooner.factor - 2.0) / (later.factor - 2.0) == pytest.approx(NOISE_TIME_S / 0.2 / FIRST_READINGS)
+
+
 def test_one_reading_moves_a_noise_by_its_share_of_twenty_seconds():
-    m = NoiseMemory(2.0, 0.3, 5.0)
+    m = NoiseMemory(2.0, 0.3, 5.0, KNOWN)
     after = followed_noise(0.9, 9.0, 0.5, 0.02, 5.0, 5.2, m)
-    assert after == NoiseMemory(pytest.approx(2.0 + 0.01 * (0.5 * 0.36 / 0.5 - 1.0) * 2.0), 0.9, 5.2)
+    assert after == NoiseMemory(pytest.approx(2.0 + 0.01 * (0.5 * 0.36 / 0.5 - 1.0) * 2.0), 0.9, 5.2, KNOWN + 1.0)
     assert followed_noise(1e3, 0.5, 0.5, 0.02, 5.0, 5.2, m).factor == pytest.approx(2.0 + 0.01 * (25.0 - 1.0) * 2.0)
 
 
 def test_readings_more_than_a_second_apart_say_nothing_of_the_noise():
-    assert followed_noise(9.0, 1.0, 0.5, 0.02, 5.0, 6.1, NoiseMemory(2.0, 0.0, 5.0)) == NoiseMemory(2.0, 9.0, 6.1)
+    assert followed_noise(9.0, 1.0, 0.5, 0.02, 5.0, 6.1, NoiseMemory(2.0, 0.0, 5.0)) == NoiseMemory(2.0, 9.0, 6.1, 1.0)
     assert followed_noise(9.0, 1.0, 0.5, 0.02, 5.0, 6.1, NoiseMemory(1.0, 0.0, -math.inf)).factor == 1.0
 
 
@@ -183,7 +191,7 @@ def test_a_noise_stays_between_a_fiftieth_and_twenty_five_times_what_is_said():
 def heard(place: int, reason: int = FUSED, stray: float = 0.0, change: float = 0.0) -> NoiseMemory:
     """The noise of a component after one reading, half a second after the one before."""
     work = new_work(ONE_LANE)
-    store_noise(work, ONE_LANE, place, 0, NoiseMemory(0.1, 0.0, 0.5))
+    store_noise(work, ONE_LANE, place, 0, NoiseMemory(0.1, 0.0, 0.5, KNOWN))
     store_echo(work, ONE_LANE, 0, EchoMemory(2.0, 0.0, 2.0, 0.0, stray))
     work[[REASON, INNOVATION, INNOVATION_VARIANCE, NOISE]] = reason, change, 2.0, 1.0
     scale_noise(work, ONE_LANE, place)
@@ -194,12 +202,12 @@ def heard(place: int, reason: int = FUSED, stray: float = 0.0, change: float = 0
 
 def test_what_is_fused_teaches_its_noise_and_a_stray_or_what_is_refused_does_not():
     taught = heard(OF_RANGE)
-    assert taught == NoiseMemory(pytest.approx(0.1 - 0.025 * 0.1), 0.0, 1.0)
-    untaught = NoiseMemory(0.1, 0.0, 0.5)
+    assert taught == NoiseMemory(pytest.approx(0.1 - 0.025 * 0.1), 0.0, 1.0, KNOWN + 1.0)
+    untaught = NoiseMemory(0.1, 0.0, 0.5, KNOWN)
     assert heard(OF_RANGE, INNOVATION_GATE) == untaught
     assert heard(OF_RANGE, stray=0.03) == untaught
     assert heard(OF_RANGE, stray=0.01) == taught
-    assert heard(OF_BARO) == NoiseMemory(SMALLEST_OF_BARO, 0.0, 1.0)  # wash and gusts last
+    assert heard(OF_BARO) == NoiseMemory(SMALLEST_OF_BARO, 0.0, 1.0, KNOWN + 1.0)  # wash and gusts last
     assert heard(OF_BARO, stray=0.03, change=1.0).factor > 0.1  # strays are the range's
 
 

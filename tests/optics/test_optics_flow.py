@@ -144,8 +144,11 @@ def test_files_that_cannot_be_frames_are_named(tmp_path: Path, monkeypatch: pyte
     with pytest.raises(InputError, match="one size"):
         read_frames([tmp_path])
     monkeypatch.setitem(sys.modules, "av", None)
-    with pytest.raises(InputError, match="pip install av"):
+    with pytest.raises(InputError, match=r"needs PyAV: pip install 'flownav\[video\]'"):
         read_frames([tmp_path / "flight.mp4"])
+    monkeypatch.setitem(sys.modules, "PIL", None)
+    with pytest.raises(InputError, match=r"pictures need Pillow: pip install 'flownav\[pictures\]'"):
+        read_frames([tmp_path])
 
 
 def test_frames_can_be_binned_and_cut() -> None:

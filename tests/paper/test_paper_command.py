@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -15,7 +15,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from browsing import CHROMIUM, QUIET, Visit
+from browsing import Visit
 from flownav.cli import paper as paper_command
 from flownav.core.errors import InputError, VerdictError
 from flownav.lab.rig.experiment import RigSettings, run_experiment
@@ -221,17 +221,6 @@ def test_the_page_draws_every_figure_without_a_complaint(whole: Outcome, browser
     assert [request for request in visit.requests if not request.startswith(("file:", "data:", "blob:"))] == []
     assert visit.page.evaluate("document.documentElement.scrollWidth") <= width
     visit.context.close()
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    if CHROMIUM is None:
-        pytest.skip("no Chromium here: install Debian's package `chromium` (apt-get install chromium)")
-    api = pytest.importorskip("playwright.sync_api", reason="install `playwright` (dependency group `test`)")
-    with api.sync_playwright() as running:
-        opened = running.chromium.launch(executable_path=CHROMIUM, args=QUIET)
-        yield opened
-        opened.close()
 
 
 # -- one table, seeds, the terminal, exit status ------------------------------------------------------------------

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -9,16 +11,17 @@ import flownav.parts.protocols as own
 from flownav.api.campaigning import campaign
 from flownav.api.flying import fly
 from flownav.api.replaying import replay
-from flownav.core.compile import equation
+from flownav.core.compile import equation, replacing
 from flownav.core.errors import InputError
 from flownav.core.record import QUATERNION
-from flownav.parts.equations import EquationFilter, EquationVehicle
+from flownav.parts.equations import EquationFilter, EquationVehicle, Said
 from flownav.parts.examples.equation_filter import Memory, equation_filter, say, step
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario
 from flownav.vehicle.helicopter import derivative, outputs
 
 SHORT = {"duration_s": 8.0}
+with_north = replacing(Said, "pos_n")
 PATH = ("pos_n_m", "pos_e_m", "pos_d_m", "vel_u_m_s", "vel_v_m_s", "vel_w_m_s", *QUATERNION)
 START = assemble(load_scenario("landing")).flight.plan.start
 VEHICLE = assemble(load_scenario("landing")).flight.vehicle
@@ -64,6 +67,35 @@ def test_a_filter_of_equations_flies_compiled_as_it_does_in_python():
         np.testing.assert_allclose(
             fast.tables["estimate"][name], slow.tables["estimate"][name], atol=1e-9, err_msg=name
         )
+
+
+@equation
+def says_nan_later(memory):
+    said = say(memory)
+    return with_north(said, pos_n=math.nan if memory.imu_s > 5.6 else said.pos_n)
+
+
+@equation
+def says_something_else(memory):
+    return memory.known, memory.pos_n
+
+
+def test_a_number_that_is_none_ends_a_flight_and_a_campaign_and_a_replay(tmp_path):
+    fly("landing", filter=equation_filter, flight=SHORT).save(tmp_path / "own.fnr")
+    late = EquationFilter("late", Memory(), step, says_nan_later)
+    for begin in (
+        lambda: fly("landing", filter=late, flight=SHORT),
+        lambda: campaign("landing", filter=late, flights=16, flight=SHORT, folder=tmp_path / "late"),
+        lambda: replay(tmp_path / "own.fnr", filter=late),
+    ):
+        with pytest.raises(InputError, match=r"^filter late: its estimate of 5\.\d\d s is not finite, or beyond"):
+            begin()
+
+
+def test_equations_that_cannot_be_compiled_are_told_in_one_line():
+    with pytest.raises(InputError, match=r"^filter short: its equations cannot be compiled: \w+: .*; mend it") as told:
+        fly("landing", filter=EquationFilter("short", Memory(), step, says_something_else), flight=SHORT)
+    assert "\n" not in str(told.value)
 
 
 def test_its_record_replays_to_the_same_bits(tmp_path):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -172,6 +174,60 @@ class NeedsMore(ComplementaryFilter):
         self.gain = gain
 
 
+class StartsBadly(ComplementaryFilter):
+    def start(self, told):
+        raise ValueError("no such gain")
+
+
+class TooFar(ComplementaryFilter):
+    def estimate(self):
+        said = super().estimate()
+        return said and said._replace(std_pos_ned_m=[1e300, 0.0, 0.0])
+
+
+class Endless(ComplementaryFilter):
+    def estimate(self):
+        said = super().estimate()
+        return said and said._replace(pos_ned_m=itertools.count())
+
+
+class TooMuch(ComplementaryFilter):
+    def update(self, reading):
+        raise MemoryError
+
+
+class Deep(ComplementaryFilter):
+    def update(self, reading):
+        return self.update(reading)
+
+
+class Unspeakable(Exception):
+    def __str__(self):
+        raise RuntimeError("not even this")
+
+
+class CannotSay(ComplementaryFilter):
+    def update(self, reading):
+        raise Unspeakable
+
+
+class Talks(ComplementaryFilter):
+    name = "two\nlines \x1b[31m" + "x" * 200
+
+    def update(self, reading):
+        raise ValueError("begins" + "\n" * 500 + "x" * 5000 + " ends")
+
+
+class SensorStartsBadly(Perfect):
+    def start(self, seed, flight):
+        raise ValueError("no such gain")
+
+
+class ControllerStartsBadly(PdController):
+    def start(self, gains):
+        raise ValueError("no such gain")
+
+
 class Leaves(ComplementaryFilter):
     def update(self, reading):
         raise SystemExit(0)
@@ -242,6 +298,15 @@ class ThreeAngles(PdController):
         ({"filter": NoNumber}, r"complementary: update\(\) gave an innovation of nan with variance 1.0"),
         ({"filter": NoGround}, r"complementary: estimate\(\).ground_d_m is \[nan\]"),
         ({"filter": NeedsMore}, r"needy: cannot be made: TypeError: .*gain"),
+        ({"filter": StartsBadly}, r"filter complementary: ValueError: no such gain; mend it"),
+        ({"sensors": [SensorStartsBadly]}, r"sensor SensorStartsBadly: ValueError: no such gain; mend it"),
+        ({"controller": ControllerStartsBadly}, r"controller pd: ValueError: no such gain; mend it"),
+        ({"filter": TooFar}, r"complementary: estimate\(\).std_pos_ned_m is beyond 1e\+09: \[1e\+300, 0.0, 0.0\]"),
+        ({"filter": Endless}, r"complementary: estimate\(\).pos_ned_m has shape \(4,\); \(3,\) is needed"),
+        ({"filter": TooMuch}, r"filter complementary: MemoryError; mend it"),
+        ({"filter": Deep}, r"filter complementary: RecursionError: maximum recursion depth exceeded"),
+        ({"filter": CannotSay}, r"filter complementary: Unspeakable; mend it"),
+        ({"filter": Talks}, r"^filter two lines \[31mx+: ValueError: begins x+ \.\.\. x+ ends; mend it"),
         ({"filter": Leaves}, r"filter complementary: SystemExit: 0; mend it"),
         ({"sensors": [ReadsNaN]}, r"sensor ReadsNaN: read\(\) gave \(nan,\); finite values, or None"),
         ({"sensors": [OneVariance]}, r"sensor OneVariance: variance \(1.0,\): three"),
@@ -257,6 +322,19 @@ def test_mistakes_are_told_in_one_line(parts, words):
     with pytest.raises(InputError, match=words) as told:
         fly("landing", flight=SHORT, **parts)
     assert "\n" not in str(told.value)
+
+
+class Grows(ComplementaryFilter):
+    """Innovations without end."""
+
+    def update(self, reading):
+        super().update(reading)
+        return (own.Innovation(0.1, 1.0) for _ in itertools.count())
+
+
+def test_innovations_without_end_end_where_the_record_has_room_for_no_more():
+    flown = fly("landing", filter=Grows, flight=SHORT)
+    assert flown.manifest["scores"]["max_position_error_m"] < 10.0
 
 
 def test_the_papers_filter_takes_no_parts():

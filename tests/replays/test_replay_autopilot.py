@@ -15,7 +15,13 @@ from flownav.cli.replay import command as replay_command
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, to_body, to_earth
 from flownav.core.measurement import Sensor, Stream
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
-from flownav.scoring.path import in_frame_of
+from flownav.logs.ulog import read_ulog
+from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.replays.bundle import to_record
+from flownav.replays.prepare import ReplayOptions
+from flownav.replays.session import replay
+from flownav.scoring.path import moved_by, placed_in
+from flownav.scoring.phases import phases_of
 from replay_logs import SyntheticLog, log_of_flight
 from ulog_files import START_US, ulog_of_flight
 
@@ -106,7 +112,7 @@ def test_without_gps_it_is_turned_with_its_attitude_and_shifted(flown):
     estimate = {"t_s": t_s, **dict(zip(POSITION_NED, (position @ turned.T + OFF_BY).T, strict=True)),
                 **dict(zip(VELOCITY_BODY, body.T, strict=True)),
                 **dict(zip(QUATERNION, askew.T, strict=True))}  # fmt: skip
-    placed = in_frame_of(flown.t_s, flown.position, estimate, {})
+    placed = moved_by(estimate, placed_in(flown.t_s, flown.position, estimate, {}))
     assert columns(placed, POSITION_NED) == pytest.approx(position, abs=1e-6)
     assert columns(placed, VELOCITY_BODY) == pytest.approx(body)
     rotation = rotation_from_quaternion(*columns(placed, QUATERNION).T)
@@ -117,5 +123,21 @@ def test_it_is_left_out_where_nothing_says_where_it_lies(flown):
     t_s = np.arange(1.0, 19.0, 0.1)
     estimate = {"t_s": t_s + 1000.0, **dict(zip(POSITION_NED, path_of(flown, t_s)[0].T, strict=True))}
     gps = {Sensor.GPS_POSITION: Stream.of(Sensor.GPS_POSITION, t_s, path_of(flown, t_s)[0])}
-    assert in_frame_of(flown.t_s, flown.position, estimate, {}) is None
-    assert in_frame_of(flown.t_s, flown.position, estimate, gps) is None
+    assert placed_in(flown.t_s, flown.position, estimate, {}) is None
+    assert placed_in(flown.t_s, flown.position, estimate, gps) is None
+
+
+def test_the_record_of_a_replay_keeps_the_landed_state_and_what_the_log_told_and_phases_follow_it(tmp_path):
+    flown = log_of_flight(30.0)
+    writer = ulog_of_flight(flown.tables).add("vehicle_status", [0.5, 9.0], uint8_t__nav_state=[2, 4])
+    writer.add("vehicle_land_detected", [0.1, 12.0, 25.0], bool__landed=[True, False, True])
+    log = read_ulog(writer.write(tmp_path / "flight.ulg"))
+    record = to_record(replay(log, ReplayOptions(), NavigatorSettingsFile()), {"duration_s": 30.0}, "")
+    assert record.tables["landed"]["landed"].tolist() == [1.0, 0.0, 1.0]
+    phases = phases_of(record)
+    assert phases[0].name == "ground"
+    assert phases[0].t1 == pytest.approx(12.0, abs=0.2)
+    assert [phase.name for phase in phases][-2:] == ["touchdown", "landed"]
+    told = [row for row in zip(*(record.tables["events"][name] for name in ("source", "kind", "detail")), strict=True)
+            if row[0] == "autopilot"]  # fmt: skip
+    assert told == [("autopilot", "mode", "Position"), ("autopilot", "mode", "Hold")]

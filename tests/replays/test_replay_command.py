@@ -148,7 +148,7 @@ def test_a_sensor_that_falls_silent_is_a_warning_in_all_that_is_said(hall):
     told = call(hall, "--force")
     assert told.exception is None  # a warning is no bad verdict
     assert f"Warning: {said}" in told.stdout
-    assert "Sensors and their innovations" in told.stdout
+    assert "Sensors, and their errors as the filter sees them" in told.stdout
     page = Path("out/hall.html").read_text()
     assert said in page
     assert "0.0 to 24.9" in page

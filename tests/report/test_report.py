@@ -115,13 +115,13 @@ def test_sensors_are_judged_in_words_and_the_drift_at_the_end_is_told() -> None:
         "coverage": {"range": {"t0": 1.0, "t1": 31.25}, "imu": {"t0": 0.0, "t1": 60.0}},
         "consistency": {"range": {"nis_per_dof": 2.5, "samples": 1234, "white": False}},
     }
-    said = "optimistic: errors are larger than stated; coloured: errors last"
+    said = "larger than stated, each like the last"
     assert sensor_rows(record) == [
         ("Rangefinder", "1.0 to 31.2", "1,234", "2.50", said),
         ("IMU", "0.0 to 60.0", NONE, NONE, ""),
     ]
     page = render(record)
-    assert "coloured: errors last" in page
+    assert "larger than stated: the sensor is trusted too much" in page
     assert "0.417" in page
     assert sensor_rows(Record()) == []
 
@@ -165,7 +165,7 @@ def test_odometry_is_not_called_truth() -> None:
         "max_position_error_m": 0.2,
     }
     text = Page(render(record)).text.replace("\N{NO-BREAK SPACE}", " ")
-    assert "Against the recorded visual odometry, an estimate itself, its position is off by 0.41 m" in text
+    assert "Against the recorded visual odometry (an estimate itself) its position is off by 0.41 m" in text
     assert "No truth: errors are shown against the visual odometry, which has errors of its own." in text
     assert "horizontal, visual odometry laid on at take-off" in text
     assert "the recorded truth" not in text

@@ -339,10 +339,10 @@ def test_what_was_flown_on_has_errors_of_its_own_and_a_line_beside_the_estimate(
     assert np.abs(np.asarray(north.y)[np.asarray(north.x) < 5.0]).max() == 0.0
     assert np.asarray(east.y)[-1] - np.asarray(east.y)[0] == pytest.approx(1.0, abs=0.5)
     assert "by definition" in panels[0].caption
-    assert "flown on" in ground_track(record).alt
-    assert "flown on" in path_over_pad(record).alt
+    assert "autopilot's input" in ground_track(record).alt
+    assert "autopilot's input" in path_over_pad(record).alt
     for panel in (position(record), velocity(record), attitude(record)):
-        assert "flown on" in {trace.name for trace in panel.figure.data}, panel.key
+        assert "autopilot's input" in {trace.name for trace in panel.figure.data}, panel.key
     keys = [panel.key for section in sections(record) if section.key == "errors" for panel in section.panels]
     assert keys == ["flown-position-error", "flown-velocity-error", "position-error", "velocity-error"]
 
@@ -350,7 +350,7 @@ def test_what_was_flown_on_has_errors_of_its_own_and_a_line_beside_the_estimate(
 def test_a_path_that_jumps_is_open_there_and_no_other_is() -> None:
     record = navigated()
     jumps = {track["name"]: track["jumps"] for track in paths_data(paths_of(record), Columns())["tracks"]}
-    assert len(jumps["flown on"]) == 1
+    assert len(jumps["autopilot's input"]) == 1
     assert jumps["estimate"] == jumps["truth"] == []
 
 
@@ -376,9 +376,9 @@ def test_ratios_far_inside_the_gate_have_no_axis_of_their_own() -> None:
 
 def test_the_words_say_what_was_flown_on_and_what_was_known() -> None:
     words = summary(navigated())
-    assert "In flight no axis of the position that was flown on was off by more than" in words
+    assert "In flight no axis of the position that the autopilot used was off by more than" in words
     assert "What the vehicle knew exactly: where it hovers for its first 5" in words
     assert "knew exactly" not in summary(flight())
     tile = tiles(navigated())[-1]
     assert tile.label == "Flow sensor engaged"
-    assert "what was flown on against the truth, in flight" in render(navigated())
+    assert "carried to the present) against the truth, in flight" in render(navigated())

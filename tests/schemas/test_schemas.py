@@ -141,6 +141,7 @@ def test_a_certificate_and_what_certify_prints_fit(folder):
     written = json.loads((folder / "cert" / "certificate.json").read_text(encoding="utf-8"))
     require_fit(written, "certificate")
     assert written["schema"] == 1
+    require_fit(printed(folder, "certify", "--verify", "cert", "--again", "4"), "certify")
 
 
 def test_the_command_prints_and_lists_them():

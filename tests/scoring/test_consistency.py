@@ -10,6 +10,7 @@ from scipy import stats
 
 from flownav.scoring.consistency import (
     HEIGHTS_M,
+    MEANING,
     ConsistencySums,
     ErrorSums,
     anees,
@@ -25,9 +26,11 @@ from flownav.scoring.consistency import (
     is_white,
     lag_one,
     largest_horizontal_error,
+    meanings,
     over_stated,
     steps_in_flight,
     verdict,
+    within_band,
 )
 from flownav.scoring.percentiles import percentile_with_interval
 
@@ -65,6 +68,25 @@ def test_which_state_is_stated_too_modestly_is_told():
     sigma[:, 2], sigma[:, 5] = 2.0, 0.5
     sums = consistency_of_block(error, sigma, (error**2).sum(axis=1), zeros + 2.0, zeros)
     assert list(over_stated(sums).values()) == pytest.approx([1.0, 1.0, 0.5, 1.0, 1.0, 2.0], rel=0.02)
+
+
+def test_the_band_is_passed_by_who_states_the_right_size_at_each_step_and_not_by_who_does_on_average():
+    draw = np.random.default_rng(7)
+    zeros = np.zeros((600, 96))
+    size = np.repeat([0.6, 1.0, 1.8], 200)  # of the variance, right at a third of the steps, and on average nearly
+
+    def group():
+        error = draw.standard_normal((600, 6, 96)) * np.sqrt(size)[:, None, None]
+        return consistency_of_block(error, np.ones_like(error), (error**2).sum(axis=1), zeros + 2.0, zeros)
+
+    groups = [group() for _ in range(20)]
+    found = within_band(groups, sum(groups[1:], groups[0]))
+    assert found.as_stated == pytest.approx(0.95 / 3.0, abs=0.02)
+    assert found.sized < 0.4
+    assert found.sized_at_each_step == pytest.approx(0.945, abs=0.01)  # the others' mean errs by a twentieth as much
+    alone = within_band(groups[:1], groups[0])
+    assert alone.as_stated == pytest.approx(found.as_stated, abs=0.03)
+    assert np.isnan([alone.sized, alone.sized_at_each_step]).all()  # nobody else tells the size
 
 
 def test_steps_on_the_ground_are_left_out():
@@ -225,13 +247,16 @@ def test_what_was_not_tested_does_not_count_and_may_leave_nothing():
 
 
 @pytest.mark.parametrize(("mean", "white", "said"), [
-    (1.0, True, "consistent"),
-    (0.51, True, "consistent"),
-    (1.99, True, "consistent"),
-    (0.49, True, "pessimistic: errors are smaller than stated"),
-    (2.01, True, "optimistic: errors are larger than stated"),
-    (1.0, False, "coloured: errors last"),
-    (0.1, False, "pessimistic: errors are smaller than stated; coloured: errors last"),
+    (1.0, True, "as stated"),
+    (0.51, True, "as stated"),
+    (1.99, True, "as stated"),
+    (0.49, True, "smaller than stated"),
+    (2.01, True, "larger than stated"),
+    (1.0, False, "each like the last"),
+    (0.1, False, "smaller than stated, each like the last"),
 ])  # fmt: skip
 def test_the_verdict_in_words(mean, white, said):
     assert verdict(mean, white=white) == said
+    meant = meanings([said, "as stated"])
+    assert [one.split(":")[0] for one in meant] == [word for word in MEANING if word in said]
+    assert all("stat" in one or "bands" in one for one in meant)

@@ -7,11 +7,16 @@ import csv
 import numpy as np
 import pytest
 
+from flownav.core.frames import quaternion_from_euler
 from flownav.scoring.errors import (
     SCORE_COLUMNS,
+    attitude_block,
+    attitude_rms,
+    attitude_scores,
     error_statistics,
     percentile_of_paper,
     published,
+    put_error_statistics,
     score_block,
     scores_of_flight,
     scores_of_flights,
@@ -35,7 +40,8 @@ def test_statistics_of_a_known_error():
 def test_statistics_in_python_and_compiled_are_the_same_bytes():
     estimate, truth = np.random.default_rng(7).normal(size=(2, 200, 6, 1))
     counted = (np.arange(200.0) % 3.0 > 0.0)[:, None]
-    in_python = error_statistics.py_func(estimate, truth, counted)
+    in_python = np.empty((estimate.shape[2], estimate.shape[1], 4))
+    put_error_statistics.py_func(estimate, truth, counted, in_python)
     assert in_python.tobytes() == error_statistics(estimate, truth, counted).tobytes()
 
 
@@ -95,3 +101,27 @@ def test_only_the_steps_that_count_are_scored_each_lane_by_itself():
     assert found[0] == pytest.approx([-1.0, 2.0, np.sqrt(5.0), 3.0])
     assert found[1] == pytest.approx(2.0 * np.array([-1.0, 2.0, np.sqrt(5.0), 3.0]))
     assert np.isnan(found[2]).all()
+
+
+def test_attitude_errors_are_those_of_the_angles_that_were_laid_between_them():
+    random = np.random.default_rng(5)
+    roll, pitch, yaw = 0.3 * random.standard_normal((3, 200))
+    yaw += np.pi  # about south, where an angle leaps by a turn
+    off = np.radians([[2.0], [-1.0], [5.0]]) + 0.01 * random.standard_normal((3, 200))
+    true = np.array([quaternion_from_euler(*angles) for angles in zip(roll, pitch, yaw, strict=True)])
+    said = np.array([quaternion_from_euler(*angles) for angles in (np.array([roll, pitch, yaw]) + off).T])
+    counted = np.ones(200)
+    counted[::7], said[0], said[3] = 0.0, np.nan, np.nan
+    found = attitude_scores(attitude_block(said[:, :, None], true[:, :, None], counted[:, None]))
+    kept = np.degrees(off[:, (counted > 0.0) & (np.arange(200) != 3)])
+    for angle, error in zip(("roll", "pitch", "yaw"), kept, strict=True):
+        expected = error.mean(), error.std(), np.sqrt(np.mean(error**2)), np.abs(error).max()
+        assert list(found[angle].values()) == pytest.approx(expected, abs=1e-9)
+    assert attitude_scores(attitude_block(np.full((5, 4, 1), np.nan), true[:5, :, None], np.ones((5, 1)))) is None
+    two = np.repeat(attitude_block(said[:, :, None], true[:, :, None], counted[:, None]), 2, axis=0)
+    assert attitude_rms(two)["yaw"] == pytest.approx(found["yaw"]["rms_error"])
+    assert attitude_rms(np.concatenate([two, 2.0 * two]))["yaw"] == pytest.approx(
+        np.sqrt(2.5) * found["yaw"]["rms_error"]
+    )
+    assert attitude_rms(None) == dict.fromkeys(("roll", "pitch", "yaw"))
+    assert attitude_scores(two)["yaw"]["rms_error"]["median"] == pytest.approx(found["yaw"]["rms_error"])

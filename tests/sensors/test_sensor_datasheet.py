@@ -76,7 +76,11 @@ def text(**replacements: str) -> str:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("value = 191.9", "value = -191.9", "dynamics.c_1_s2: Input should be greater than 0, got -191.9"),
+        (
+            "value = 191.9",
+            "value = -191.9",
+            "dynamics.c_1_s2: Input should be greater than or equal to 0.001, got -191.9",
+        ),
         ("b_1_s =", "b_rad_s =", "dynamics.b_rad_s: unknown key; known here: a_1_s2, b_1_s, c_1_s2 (and 1 more)"),
         ("schema_version = 1", "schema_version = 2", "schema_version: Input should be 1, got 2"),
         ('law = "power"', 'law = "cubic"', "noise.law: Input should be 'constant', 'power' or 'accuracy', got 'cubic'"),

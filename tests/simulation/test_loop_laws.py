@@ -8,7 +8,7 @@ import pytest
 from flownav.control.autopilot import Estimate
 from flownav.control.guidance import Knowledge, Reference
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, to_earth
-from flownav.estimation.consistency import normalised_error, pack
+from flownav.estimation.consistency import normalised_error
 from flownav.estimation.named import Attitude, PositionNed, VelocityNed
 from flownav.estimation.states import STATE, STATES
 from flownav.navigation.memory import new_work
@@ -18,7 +18,8 @@ from flownav.simulation.navigating import compare_at_horizon, find_place, hand_t
 from flownav.simulation.records import Estimated, Felt, Loads, PadPlace
 from flownav.simulation.said import GroundSaid, PadSaid, PadVariance, StatedVariance
 from flownav.simulation.sensing import motion_of, true_imu
-from flownav.vehicle.state import HelicopterState
+from flownav.vehicle.state import CALM, HelicopterState
+from packed_covariance import pack
 
 STILL = HelicopterState(**dict.fromkeys(HelicopterState._fields, 0.0) | {"qw": 1.0})
 RUNS, WAITS = StartMemory(started=1.0), StartMemory()
@@ -47,11 +48,11 @@ def test_a_hovering_imu_feels_gravity_and_a_turning_one_its_rate():
 
 
 def test_what_is_felt_is_the_mean_of_the_epoch_and_outlives_a_silent_reading():
-    nothing = Felt(*(9.0,) * 6)
-    first = feel.law(nothing, Reading(value_3=1.0, value_4=2.0, value_5=3.0), part=0, parts=2)
+    nothing = Felt(*(9.0,) * 8)
+    first = feel.law(nothing, Reading(0.2, 0.4, 0.0, 1.0, 2.0, 3.0), part=0, parts=2)
     second = feel.law(first, Reading(value_3=nan, value_4=4.0, value_5=5.0), part=1, parts=2)
-    assert first == (0.5, 1.0, 1.5, 1.0, 2.0, 3.0)
-    assert second == (1.0, 3.0, 4.0, 1.0, 4.0, 5.0)
+    assert first == (0.5, 1.0, 1.5, 1.0, 2.0, 3.0, 0.1, 0.2)
+    assert second == (1.0, 3.0, 4.0, 1.0, 4.0, 5.0, 0.1, 0.2)
 
 
 def test_errors_at_the_horizon_are_said_once_the_navigator_runs_and_the_horizon_is_past_the_start():
@@ -100,12 +101,16 @@ def test_home_is_what_the_estimate_has_beyond_the_path():
 def test_a_vehicle_knows_its_place_over_the_pad_by_the_worse_axis():
     before, quiet = Knowledge(0.0, 0.0, 1.0, 0.0, 0.0), SuspicionMemory()
     variance, ground = PadVariance(1.0, 4.0, 9.0, 0.25), GroundMemory(known=1.0)
-    found = note_knowledge.law(before, PadSaid(1.0, 0.0, 0.0), variance, ground, quiet)
-    assert found == (1.0, 1.0, pytest.approx(1.02), 3.0, 0.0)
-    unseen = note_knowledge.law(before, PadSaid(0.0, 0.0, 0.0), variance, ground, quiet._replace(suspected=2.0))
-    assert unseen == (0.0, 1.0, pytest.approx(1.02), 2.0, 1.0)
-    lost = note_knowledge.law(before, PadSaid(1.0, 0.0, 0.0), variance._replace(over_n_m2=nan), ground, quiet)
+    found = note_knowledge.law(before, CALM, PadSaid(1.0, 0.0, 0.0), variance, ground, quiet)
+    assert found == (1.0, 1.0, pytest.approx(1.02), 3.0, 0.0, 0.0)
+    unseen = note_knowledge.law(before, CALM, PadSaid(0.0, 0.0, 0.0), variance, ground, quiet._replace(suspected=2.0))
+    assert unseen == (0.0, 1.0, pytest.approx(1.02), 2.0, 1.0, 0.0)
+    lost = note_knowledge.law(before, CALM, PadSaid(1.0, 0.0, 0.0), variance._replace(over_n_m2=nan), ground, quiet)
     assert lost.sigma_m == inf
+    cut = CALM._replace(engine=0.0)
+    told = note_knowledge.law(lost, cut, PadSaid(1.0, 0.0, 0.0), variance, ground, quiet)
+    assert told.powerless_s == pytest.approx(0.02)  # as the speed controller tells, epoch by epoch
+    assert note_knowledge.law(told, cut, PadSaid(1.0, 0.0, 0.0), variance, ground, quiet).powerless_s > 0.03
 
 
 def test_the_normalised_error_is_that_of_the_joint_form():

@@ -11,7 +11,9 @@ from flownav.simulation.ground import (
     RecirculationSettings,
     RecirculationState,
     recirculated,
+    ringed,
     step_recirculation,
+    vortex_ring,
 )
 from flownav.simulation.wind import WindVelocity
 from flownav.vehicle.kinds import disc_of, load_vehicle
@@ -73,3 +75,36 @@ def test_it_is_stationary_and_forgets_in_the_time_that_an_eddy_takes():
         state = step_recirculation(state, RecirculationState(*generator.standard_normal((3, 20000))), P)
     assert np.var(state.down) == pytest.approx(1.0, abs=0.04)
     assert np.mean(first * state.down) == pytest.approx(math.exp(-1.0), abs=0.03)
+
+
+# -- the vortex ring ---------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("descent", "across", "share"),
+    [
+        (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.45, 0.0, 0.0), (0.675, 0.0, 0.5), (0.9, 0.0, 1.0), (1.3, 0.0, 1.0),
+        (1.55, 0.0, 0.5), (1.8, 0.0, 0.0), (3.0, 0.0, 0.0), (1.0, 0.475, 0.75), (1.0, 0.95, 0.0), (1.0, 3.0, 0.0),
+    ],
+)  # fmt: skip
+def test_a_rotor_is_in_a_ring_while_it_sinks_with_its_wake_and_is_not_blown_out_of_it(descent, across, share):
+    assert ringed(descent, across) == pytest.approx(share)
+
+
+def test_a_ring_pulls_the_air_down_through_the_rotor_and_shakes_it():
+    vi = DISC.induced_m_s
+    held = vortex_ring(STILL, QUIET, vi, 0.0, WEIGHT, P)
+    assert held.wind_d_m_s == pytest.approx(0.25 * vi, rel=0.02)
+    assert held._replace(wind_d_m_s=0.0) == STILL
+    shaken = vortex_ring(STILL, RecirculationState(1.0, -1.0, 2.0), vi, 0.0, WEIGHT, P)
+    assert shaken.wind_d_m_s == pytest.approx(0.45 * vi, rel=0.02)
+    assert (shaken.turn_n_rad_s, shaken.turn_e_rad_s) == (
+        pytest.approx(-0.2 * vi / 0.89, rel=0.02), pytest.approx(0.4 * vi / 0.89, rel=0.02),
+    )  # fmt: skip
+
+
+def test_an_updraught_is_a_descent_and_without_thrust_or_sinking_slowly_there_is_no_ring():
+    vi = DISC.induced_m_s
+    rising = vortex_ring(STILL._replace(wind_d_m_s=-vi), QUIET, 0.0, 0.0, WEIGHT, P)
+    assert rising.wind_d_m_s + vi == pytest.approx(0.25 * vi, rel=0.02)
+    assert vortex_ring(STILL, QUIET, vi, 0.0, 0.0, P) == STILL
+    for slow in (-2.0, 0.0, 0.44 * vi):
+        assert vortex_ring(STILL, RecirculationState(1.0, 1.0, 1.0), slow, 0.0, WEIGHT, P) == STILL

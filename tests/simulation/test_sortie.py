@@ -7,7 +7,7 @@ import pytest
 
 from flownav.campaigns.local import fly_recorded, touchdown_history
 from flownav.core.record import POSITION_NED, QUATERNION
-from flownav.navigation.still import MOVES
+from flownav.navigation.windows import MOVES
 from flownav.scoring.landings import REST_DISTANCE, succeeded
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_blocks

@@ -17,21 +17,22 @@ from flownav.simulation.ensemble import believed
 from flownav.simulation.ground import GroundSettings
 from flownav.simulation.layout import load_around, store_helicopter
 from flownav.simulation.scenario import load_scenario, with_vehicle
-from flownav.simulation.surroundings import draw_recirculation, start_surroundings, surround
+from flownav.simulation.surroundings import Runs, draw_recirculation, start_surroundings, surround
 from flownav.simulation.truth import packed_truth
 from flownav.simulation.wind import WindSettings
 from flownav.vehicle.state import HelicopterState
 
 COUNT = len(LANES)
+RUNS = Runs(engine=1.0, motor_out=0.0, tail_stuck=0.0)
 
 
 @kernel
-def around_of(work, lanes, noise, rotors, recirculates, engine, epochs):
+def around_of(work, lanes, noise, rotors, recirculates, now, epochs):
     key_lanes(work, lanes, noise.streams, 0)
     draw_recirculation(work, lanes, 3, 0, 0, recirculates)
     start_surroundings(work, lanes, rotors)
     for epoch in range(epochs):
-        surround(work, lanes, 3, 0, epoch, rotors, recirculates, engine)
+        surround(work, lanes, 3, 0, epoch, rotors, recirculates, now)
 
 
 @kernel
@@ -39,14 +40,14 @@ def put(work, lanes, lane, state):
     store_helicopter(work, lanes, lane, state)
 
 
-def surrounded(flight, truths, states, *, recirculates=False, engine=1.0, epochs=1, thrust_n=0.0):
+def surrounded(flight, truths, states, *, recirculates=False, now=RUNS, epochs=1, thrust_n=0.0):
     """What surrounds each lane's vehicle: a list of Around."""
     work = np.zeros(layout.ROWS * COUNT)
     work[layout.AS_IS_BEGIN * COUNT : layout.AS_IS_END * COUNT] = packed_truth(truths)
     work[layout.THRUST * COUNT : (layout.THRUST + 1) * COUNT] = thrust_n
     for lane, state in enumerate(states):
         put(work, LANES, lane, state)
-    around_of(work, LANES, plain_noise(COUNT), flight.rotors, recirculates, engine, epochs)
+    around_of(work, LANES, plain_noise(COUNT), flight.rotors, recirculates, now, epochs)
     return [load_around(work, LANES, lane) for lane in range(COUNT)]
 
 
@@ -116,7 +117,8 @@ def test_the_wake_comes_back_near_the_ground_only_and_differs_from_flight_to_fli
     assert all(one.wind_d_m_s == 0.0 for one in again)
 
 
-def test_the_engine_is_what_the_epoch_says(flight):
+def test_what_runs_is_what_the_epoch_says(flight):
     truths = [believed(flight)] * COUNT
-    for engine in (1.0, 0.0):
-        assert {one.engine for one in surrounded(flight, truths, [at(1.0)] * COUNT, engine=engine)} == {engine}
+    for now in (RUNS, Runs(0.0, 1.0, 0.0), Runs(1.0, 0.0, 1.0)):
+        found = surrounded(flight, truths, [at(1.0)] * COUNT, now=now)
+        assert {(one.engine, one.motor_out, one.tail_stuck) for one in found} == {now}

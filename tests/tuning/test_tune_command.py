@@ -20,8 +20,9 @@ from flownav.logs.open_log import open_flight
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import ReplayOptions
 from flownav.studies.tuning import job
+from flownav.studies.tuning.knobs import KNOBS
 from replay_logs import log_of_flight, write_table
-from tuning_logs import noisy_flight
+from tuning_logs import flight_in_mid_air, noisy_flight
 
 
 @pytest.fixture(scope="module")
@@ -115,6 +116,35 @@ def test_the_order_of_logs_changes_nothing_and_one_is_held_out_whole(logs):
     assert first["logs"][1]["fit_windows"] == []
     assert first["logs"][1]["gain_nats"] > 0.0
     assert tomllib.loads(Path("first.toml").read_text()) == tomllib.loads(Path("second.toml").read_text())
+
+
+def test_a_log_that_is_too_short_is_left_out_with_a_word(logs, monkeypatch):
+    """And changes nothing of what the others say, nor which of them are held out."""
+    monkeypatch.setattr(job, "KNOBS", KNOBS[:1])  # the others take most of the time
+    alone = answer(logs / "one", "--out", "alone.toml")
+    beside = answer(logs / "short", logs / "one", "--out", "beside.toml")
+    why = "the flight lasts 25.8 s, too short for 12 windows of 3 s"
+    assert beside["left_out"] == [{"log": "short", "why": why}]
+    assert alone["left_out"] == []
+    assert beside | {"file": None, "left_out": []} == alone | {"file": None}
+    assert f"# short: left out: {why}" in Path("beside.toml").read_text()
+    assert f"Left out: short: {why}" in " ".join(call(logs / "short", logs / "one").stdout.split())
+
+
+def test_what_is_unknown_at_the_start_is_tuned_on_several_flights(tmp_path, monkeypatch):
+    """Gyros whose bias is a twentieth of what is stated, in flights that begin in the air."""
+    monkeypatch.setattr(job, "KNOBS", [knob for knob in KNOBS if knob.keys == ("gyro_bias_sigma_rad_s",)])
+    paths = [flight_in_mid_air(tmp_path / f"{seed}", seed=seed) for seed in range(4)]
+    Path("stated.toml").write_text("gyro_bias_sigma_rad_s = 0.01\n")
+    facts = answer(*paths, "--settings", "stated.toml", "--out", "tuned.toml")
+    found = proposed(facts)["gyro_bias_sigma_rad_s"]
+    assert facts["verdict"] == "accepted"
+    assert 0.001 <= found["low"] <= found["value"] < 0.004
+    assert found["high"] < 0.01
+    assert [log["held_out_whole"] for log in facts["logs"]] == [False, True, False, False]
+    assert facts["logs"][1]["median_error_tuned"] < 0.9 * facts["logs"][1]["median_error"]
+    with pytest.raises(InputError, match="nothing can be tuned"):  # two fitted flights are two starts
+        job.tune(paths[:3], [open_flight(path) for path in paths[:3]], ReplayOptions(), None)
 
 
 # -- what does not ------------------------------------------------------------------------------------------

@@ -14,7 +14,17 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.studies.tuning.job import proposals
 from flownav.studies.tuning.knobs import KNOBS, MOST_NOISE, knobs_of, limits_of, rounded, turned
 from flownav.studies.tuning.scores import Gains
-from flownav.studies.tuning.search import ACCEPTED, NOT_ACCEPTED, Found, interval_of, judge, judged, resampled, search
+from flownav.studies.tuning.search import (
+    ACCEPTED,
+    NOT_ACCEPTED,
+    Found,
+    interval_of,
+    judge,
+    judged,
+    resampled,
+    search,
+    student_of,
+)
 
 SETTINGS = NavigatorSettingsFile()
 NOISES = [knob for knob in KNOBS if knob.name in ("gyro noise", "accelerometer noise", "range noise")]
@@ -58,6 +68,38 @@ def test_an_interval_lies_about_the_top_and_not_about_a_step_of_the_search():
         found = search(Hills(np.log([factor, 1.0, 1.0]), np.array([1.0, 0.0, 0.0]), spread=1e-4), SETTINGS)
         low, high = np.exp(found.intervals[0])
         assert 0.999 * factor < low <= factor <= high < 1.001 * factor
+
+
+@dataclass
+class Ranges:
+    """Trials of one knob: logs whose tops are given, each of whose windows agree with one another."""
+
+    tops: np.ndarray
+    knobs: list
+
+    @property
+    def courses(self):
+        return [None] * len(self.tops)
+
+    def gains(self, log_factors):
+        (factor,) = log_factors
+        return [Gains(np.full(12, top**2 - (factor - top) ** 2), np.full(12, np.nan)) for top in self.tops]
+
+
+@pytest.mark.parametrize(("tops", "moves"), [
+    ((0.9, 1.0, 1.1), True), ((0.4, 1.0, 1.6), False), ((0.2, 1.0, 1.0, 1.8), False), ((0.6, 1.0, 1.0, 1.4), True),
+])  # fmt: skip
+def test_of_starts_each_log_is_one_sample(tops, moves):
+    """However many windows agree: by them, any of these would move."""
+    start, noise = (
+        next(knob for knob in KNOBS if knob.name == name) for name in ("gyro bias at the start", "gyro noise")
+    )
+    found = search(Ranges(np.array(tops), [start]), SETTINGS)
+    assert bool(found.log_factors[0]) == moves
+    assert search(Ranges(np.array(tops), [noise]), SETTINGS).log_factors[0] == pytest.approx(1.0)
+    if moves:
+        half = {3: 4.303, 4: 3.182}[len(tops)] * np.std(tops, ddof=1) / len(tops) ** 0.5  # Student's t, of a table
+        assert found.intervals[0] == pytest.approx((1.0 - half, 1.0 + half), abs=1e-3)
 
 
 def test_what_chance_could_have_moved_stays():
@@ -112,6 +154,22 @@ def test_an_imu_that_serves_leaves_no_attitude_to_tune():
     assert names(5.0) == ["attitude noise"]
 
 
+def test_starts_are_tuned_where_they_are_asked_for_and_heard():
+    def names(*sensors: Sensor) -> set[str]:
+        streams = {sensor: Stream.of(sensor, 0.01 * np.arange(200), np.zeros((200, len(COLUMNS[sensor]))))
+                   for sensor in sensors}  # fmt: skip
+        log = Log(Path("made"), streams)
+        asked = {knob.name for knob in knobs_of(log, SETTINGS, starts=True)}
+        return asked - {knob.name for knob in knobs_of(log, SETTINGS)}
+
+    moved = {"gyro bias at the start", "accelerometer bias at the start", "velocity at the start"}
+    assert names(Sensor.IMU) == moved
+    assert names(Sensor.IMU, Sensor.FLOW_RATE) == {*moved, "flow scale at the start"}
+    assert names(Sensor.IMU, Sensor.MAG) == {*moved, "compass deviation at the start", "heading error at the start"}
+    assert names(Sensor.IMU, Sensor.GPS_VELOCITY) == {*moved, "GPS velocity's lag at the start"}
+    assert names(Sensor.ATTITUDE) == {"velocity at the start", "heading error at the start"}
+
+
 def test_factors_make_settings_with_few_digits():
     assert turned(SETTINGS, NOISES, [np.log(3.0), 0.0, 0.0]) == {"gyro_noise_rad_s_rt_hz": 0.012}
     assert rounded(0.123456) == 0.1235
@@ -163,6 +221,12 @@ def test_intervals_of_few_windows_hold_as_often_as_they_say():
         low, high = interval_of(resampled([draw.standard_normal(6)], trial)[:, 0], 6)
         held += low <= 0.0 <= high
     assert held / 400 == pytest.approx(0.95, abs=0.035)  # plain percentiles: 0.87
+
+
+def test_intervals_of_three_logs_hold_as_often_as_they_say():
+    draw = np.random.default_rng(4)
+    ends = [student_of(draw.standard_normal(3)) for _ in range(2000)]
+    assert np.mean([low <= 0.0 <= high for low, high in ends]) == pytest.approx(0.95, abs=0.015)
 
 
 def test_the_same_draws_each_time():

@@ -49,7 +49,7 @@ def drawn_around(rng: np.random.Generator) -> Around:
     winds = dict(zip(Around._fields[:6], rng.normal(size=6), strict=True))
     slope = {"slope_n": n, "slope_e": e, "cosine": 1.0 / math.sqrt(1.0 + n * n + e * e)}
     ground = dict(zip(Around._fields[9:19], 0.02 * rng.normal(size=10), strict=True))
-    return Around(**winds, **slope, **ground, engine=1.0)
+    return Around(**winds, **slope, **ground, engine=1.0, motor_out=0.0, tail_stuck=0.0)
 
 
 def quad_state(rng: np.random.Generator, vehicle: MultirotorParameters) -> MultirotorState:

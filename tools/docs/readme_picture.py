@@ -1,7 +1,6 @@
-"""The README's picture: the command that it names is run, and its report photographed in headless Chromium.
+"""The picture of README and front page: the command that README names is run, and its landing drawn from its record.
 
-`readme_picture.py [OUT.png]` writes docs/pictures/landing.png. It needs Chromium and the group `test` (playwright), so
-it is run by hand when the report changes, and not by the build.
+`readme_picture.py [OUT.svg]` writes docs/pictures/landing.svg, run by hand when the picture or the flight changes.
 """
 
 from __future__ import annotations
@@ -13,15 +12,9 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from PIL import Image
-from playwright.sync_api import Error, sync_playwright
-
 PROJECT = Path(__file__).parents[2]
-PICTURE = PROJECT / "docs" / "pictures" / "landing.png"
-NAMED = re.compile(r"\*The report of `flownav ([^`]+)`")
-WIDE_PX, HIGH_PX = 1280, 1500
-DRAWN_MS = 60_000
-COLOURS = 128  # of the picture: a page of a few colours needs no more, and is a third of the size
+PICTURE = PROJECT / "docs" / "pictures" / "landing.svg"
+NAMED = re.compile(r"\*The landing of `flownav ([^`]+)`")
 
 
 def command() -> list[str]:
@@ -33,28 +26,18 @@ def command() -> list[str]:
 
 
 def main(out: Path) -> None:
-    """Run the command in an empty folder and photograph the top of the report that it writes."""
+    """Run the command in an empty folder and draw the landing of the record that it writes."""
+    from flownav.core.record import Record
+    from flownav.report.landing import landing_picture
+
     with TemporaryDirectory() as folder:
         record = Path(folder) / "flight.fnr"
-        subprocess.run([sys.executable, "-m", "flownav", *command(), "--out", str(record)], cwd=folder, check=True)
-        photograph(record.with_suffix(".html"), out)
-
-
-def photograph(page_file: Path, out: Path) -> None:
-    """The top of a report, when its figures are drawn, as a PNG of few colours."""
-    with sync_playwright() as playwright:
-        try:
-            browser = playwright.chromium.launch()
-        except Error:  # Debian's own
-            browser = playwright.chromium.launch(executable_path="/usr/bin/chromium")
-        page = browser.new_page(viewport={"width": WIDE_PX, "height": HIGH_PX})
-        page.goto(page_file.resolve().as_uri())
-        page.wait_for_selector("html[data-figures=drawn]", timeout=DRAWN_MS)
-        page.screenshot(path=str(out))
-        browser.close()
-    with Image.open(out) as picture:
-        few = picture.convert("RGB").quantize(COLOURS)
-    few.save(out, optimize=True)
+        order = [sys.executable, "-m", "flownav", *command(), "--out", str(record), "--no-report"]
+        subprocess.run(order, cwd=folder, check=True)
+        picture = landing_picture(Record.load(record), alone=True)
+    if picture is None:
+        raise ValueError(f"flownav {shlex.join(command())} did not land")
+    out.write_text(picture.svg, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -34,6 +34,9 @@ MEANINGS = {
     "flown": "What the simulated autopilot flew on: the estimate carried from the horizon to the present, its position "
     "relative to where the pad is taken to be.",
     "command": "What the vehicle was told: the reference and the controls.",
+    "setpoint": "What a log says that its autopilot asked for, in the frame of the estimate: position and attitude, "
+    "each where it was asked for.",
+    "battery": "The battery, as a log has it.",
     "innovation": "One row for each component of a measurement that was offered to the filter: what was observed, how "
     "far it lay from the prediction, whether it was fused, and the reason where it was not.",
     "events": "One row for each happening: its source, its kind, its detail in words, and a value.",

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 UNITS = {
-    "1_rad": "1/rad", "1_s": "1/s", "1_s2": "1/s²", "ah": "Ah", "deg": "°", "deg_s": "°/s", "deg_s_g": "°/s/g",
+    "1_rad": "1/rad", "1_s": "1/s", "1_s2": "1/s²", "a": "A", "ah": "Ah", "deg": "°", "deg_s": "°/s",
+    "deg_s_g": "°/s/g",
     "deg_s_rt_hz": "°/s/√Hz", "deg_s_rthz": "°/s/√Hz", "deg_s_rts": "°/s/√s", "20ft_m_s": "m/s", "g": "g",
     "gauss": "G", "hz": "Hz", "kg": "kg", "kg_m2": "kg·m²", "kg_m3": "kg/m³", "m": "m", "m2": "m²", "m2_s2": "m²/s²",
     "m_per_h": "m/h", "m_rt_s": "m/√s", "m_s": "m/s", "m_s2": "m/s²", "m_s2_rt_hz": "m/s²/√Hz",

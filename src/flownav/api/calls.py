@@ -3,7 +3,7 @@
 import atexit
 import hashlib
 import inspect
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from numbers import Integral
@@ -13,8 +13,8 @@ from tempfile import mkdtemp
 from typing import Any
 
 from flownav.core.errors import InputError, arg
-from flownav.core.guard import written_whole
-from flownav.core.text import to_toml
+from flownav.core.guard import write_text
+from flownav.core.text import meant, to_toml
 from flownav.parts.calling import name_of
 from flownav.parts.naming import OURS, part_of, require
 from flownav.parts.protocols import Parts
@@ -54,13 +54,6 @@ def require_from(name: str, value: int, low: int, high: int) -> None:
         raise InputError(f"{name} = {value!r}: must be a whole number from {low} to {high}")
 
 
-def require_path(name: str, value: Any) -> Path:
-    """The path. InputError where something else is given."""
-    if not isinstance(value, str | Path):
-        raise InputError(f"{name}: {type(value).__name__} is given; a path is needed")
-    return Path(value)
-
-
 def split(filter: Any, sensors: Sequence[Any], vehicle: Any, controller: Any) -> tuple[Parts, str | None, Any]:
     """What is somebody else's, and the names of filter and vehicle that are the scenario's (None where they are not).
 
@@ -71,8 +64,6 @@ def split(filter: Any, sensors: Sequence[Any], vehicle: Any, controller: Any) ->
         own_filter, filter = _part("filter", filter), None
     if vehicle is not None and (hasattr(vehicle, "derivative") or (isinstance(vehicle, str) and ":" in vehicle)):
         own_vehicle, vehicle = _part("vehicle", vehicle), None
-    if isinstance(sensors, str) or not isinstance(sensors, Sequence):
-        raise InputError("sensors: a list of them is needed, such as sensors=[MyRange]")
     own_sensors = tuple(_part("sensor", sensor) for sensor in sensors)
     own_controller = None if controller is None else _part("controller", controller)
     return Parts(own_filter, own_sensors, own_vehicle, own_controller), filter, vehicle
@@ -98,6 +89,14 @@ def _part(kind: str, part: Any) -> Any:
 Entries = dict[str, Any]
 
 
+def require_known(changes: Mapping[str, Any], keys: Iterable[str], function: Callable[..., Any]) -> None:
+    """InputError where a change is no key, but near the name of one of the function's own arguments."""
+    own = [name for name in inspect.signature(function).parameters if name != "changes"]
+    for name in changes:
+        if "." not in name and name not in keys and (near := meant(name, own)):
+            raise InputError(f"{name}: neither an argument nor a key of a scenario{near}")
+
+
 def merged(entries: Mapping[str, Any], changes: Mapping[str, Any], where: str) -> Entries:
     """A copy of the entries with these changes. InputError where a dotted name leads into no table.
 
@@ -106,6 +105,8 @@ def merged(entries: Mapping[str, Any], changes: Mapping[str, Any], where: str) -
     """
     found = dict(entries)
     for name, value in changes.items():
+        if not isinstance(name, str):
+            raise InputError(f"{where}: {name!r} is no name of a value; give text")
         key, dot, rest = name.partition(".")
         if dot:
             value = {rest: value}
@@ -153,8 +154,8 @@ def _folder() -> Path:
 
 def saved(entries: Mapping[str, Any], path: Path) -> Path:
     """Write nested dictionaries as a TOML file, whole or not at all. InputError where it cannot be written there."""
-    with writing(path), written_whole(path) as temporary:
-        temporary.write_text(f"# written by flownav\n{to_toml(entries)}", encoding="utf-8")
+    with writing(path):
+        write_text(to_toml(entries), path)
     return path
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flownav.api.arguments import checked
 from flownav.api.calls import writing
 from flownav.api.record import Record
 from flownav.api.table import library
@@ -70,6 +71,7 @@ class Campaign:
         found: list[dict[str, Any]] = self.summary["worst"]
         return found
 
+    @checked
     def figure(self, name: str, cell: int = 0) -> dict[str, float | None]:
         """One figure of a cell: value, low and high (its 95 % interval). InputError names those that there are.
 
@@ -98,6 +100,7 @@ class Campaign:
         found: pandas.DataFrame = frames_of.concat(frames, ignore_index=True)
         return found
 
+    @checked
     def record(self, flight: int, *, cell: int = 0) -> Record:
         """One flight of the campaign flown again, to the bit, as a record. InputError where there is no such flight.
 
@@ -112,6 +115,7 @@ class Campaign:
             raise InputError(f"flight {flight}: there are flights 0 to {self.plan.flights - 1} of each cell")
         return Record.of(record_again(self.plan, cell, flight, recording_of(self._engine)))
 
+    @checked
     def plot(self, cell: int = 0) -> Any:
         """Where the flights of a cell first touched the pad, with their radii, as a Plotly figure.
 
@@ -129,6 +133,7 @@ class Campaign:
             raise InputError(f"{own['label']}: its flights were not to land; plot needs a scenario that lands")
         return over_the_pad("pad", own, touched, common_reach_m([own], [touched])).figure
 
+    @checked
     def report(self, path: str | Path | None = None) -> Path:
         """Write the campaign as one HTML page; where it lies, which is in its folder unless a path is given.
 

@@ -10,7 +10,8 @@ from tempfile import mkdtemp
 from typing import Any
 from weakref import finalize
 
-from flownav.api.calls import call_of, require_from, split
+from flownav.api.arguments import checked
+from flownav.api.calls import call_of, require_from, require_known, split
 from flownav.api.campaign import Campaign
 from flownav.api.record import Record
 from flownav.api.scenario import Scenario, scenario_of
@@ -28,6 +29,7 @@ from flownav.core.files import written_whole
 from flownav.core.provenance import called_as
 from flownav.parts.flying import OwnPartsEngine, identities
 from flownav.parts.protocols import Controller, Filter, SensorModel, VehicleModel
+from flownav.simulation.scenario import Scenario as ScenarioFile
 
 FLIGHTS, FLIGHTS_UNTIL = 1000, 100_000
 TRUTH_MODELS = ("ensemble", "matched", "both")
@@ -36,6 +38,7 @@ MOST_SEED = 2**63 - 1
 Named = str | Path | Scenario
 
 
+@checked
 def campaign(
     scenario: Named | Sequence[Named] = "landing",
     *,
@@ -74,12 +77,15 @@ def campaign(
         [16, 16]
     """
     chosen = [scenario] if isinstance(scenario, str | Path | Scenario) else list(scenario)
+    if not chosen:
+        raise InputError("scenario: an empty list is given; name at least one")
     most = FLIGHTS if until is None else FLIGHTS_UNTIL
     call = call_of("campaign", *([chosen[0]] if len(chosen) == 1 else [chosen]), flights=flights, seed=seed,
                    sweep=sweep, sampling=sampling, truth_model=truth_model, until=until, filter=filter,
                    vehicle=vehicle, sensors=list(sensors), controller=controller,
                    **changes)  # fmt: skip
     parts, our_filter, our_vehicle = split(filter, sensors, vehicle, controller)
+    require_known(changes, ScenarioFile.model_fields, campaign)
     fixed, rest = _split(changes)
     plan = plan_of(
         [scenario_of(one, filter=our_filter, vehicle=our_vehicle, **rest) for one in chosen],

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from flownav.api.calls import call_of, require_from, split
+from flownav.api.arguments import checked
+from flownav.api.calls import call_of, require_from, require_known, split
 from flownav.api.record import Record
 from flownav.api.scenario import Scenario, scenario_of
 from flownav.api.vehicle import Vehicle
@@ -19,14 +20,16 @@ from flownav.core.provenance import called_as
 from flownav.core.record_file import load_libraries
 from flownav.parts.flying import fly_parts, fly_with, names_of
 from flownav.parts.protocols import Controller, Filter, Parts, SensorModel, VehicleModel
-from flownav.scoring.errors import percentile_of_paper, published, scores_of_flights
-from flownav.scoring.landings import takeoff_of_flights
+from flownav.scoring.errors import attitude_scores, percentile_of_paper, published, scores_of_flights, touchdown_rows
+from flownav.scoring.landings import takeoff_of_flights, touches_of_flights
 from flownav.scoring.touchdown import load_kernel
 from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.engine import fly_one
 from flownav.simulation.ensemble import Ensemble
+from flownav.simulation.scenario import Scenario as ScenarioFile
 
 OF_MANY_FLIGHTS = ("rmse_over_bound", "anees_inside_fraction", "error_over_stated")
+UNCOUNTED: dict[str, Any] = {"takeoff": None, "attitude_deg": None}  # of many flights with parts or on pixels
 MOST_FLIGHTS, MOST_SEED = 10_000_000, 2**63 - 1
 
 NO_PARTS = Parts()
@@ -34,6 +37,7 @@ NO_PARTS = Parts()
 Progress = Callable[[int], object]
 
 
+@checked
 def fly(
     scenario: str | Path | Scenario = "sortie",
     *,
@@ -66,6 +70,7 @@ def fly(
     """
     number = 0 if isinstance(flight, Mapping) else flight
     parts, own_filter, own_vehicle = split(filter, sensors, vehicle, controller)
+    require_known(changes, ScenarioFile.model_fields, fly)
     options: dict[str, Any] = {"filter": own_filter, "vehicle": own_vehicle, **changes}
     if isinstance(flight, Mapping):
         options["flight"] = flight
@@ -159,9 +164,12 @@ def _fly_many(
         facts["known_exactly"] = known_exactly(setup.scenario)
     scores = scores_of_flights(judged.scores)
     scores["takeoff"] = None if judged.takeoffs is None else takeoff_of_flights(judged.takeoffs)
+    scores["attitude_deg"] = None if judged.attitude_deg is None else attitude_scores(judged.attitude_deg)
     table = published(setup.scenario.paper_table)
     percentile = {"paper_percentile": percentile_of_paper(judged.scores, table)} if table else {}
     record = Record.of(fly_recorded(setup, seed, index, truths))
+    if scores["touchdown"] is not None:
+        record.manifest["many"] = touches_of_flights(touchdown_rows(judged.scores), scores["touchdown"])
     return Flights(record, index, facts | scores | percentile)
 
 
@@ -177,7 +185,7 @@ def _fly_parts(
         advance(1)
     index = first + median_flight(np.array(rows)) if rows else first
     record = Record.of(fly_with(setup, parts, seed, index, truths))
-    scores = scores_of_flights(np.array(rows)) | {"takeoff": None} if rows else record.scores
+    scores = scores_of_flights(np.array(rows)) | UNCOUNTED if rows else record.scores
     named = {"filter": record.manifest["filter"], "parts": record.manifest["parts"]}
     return Flights(record, index, facts | named | _nothing_of_many(setup) | scores)
 
@@ -198,7 +206,7 @@ def _fly_pixels(
     assert setup.fitted is not None
     assert setup.fitted.sheets.pad_camera is not None
     facts["pad_frames"] = agreement(frames, setup.fitted.sheets.pad_camera)
-    scores = records[0].manifest["scores"] if flights == 1 else scores_of_flights(np.array(rows)) | {"takeoff": None}
+    scores = records[0].manifest["scores"] if flights == 1 else scores_of_flights(np.array(rows)) | UNCOUNTED
     return Flights(Record.of(records[0]), first, facts | _nothing_of_many(setup) | scores)
 
 

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from flownav.api.arguments import checked
 from flownav.core.errors import InputError
 from flownav.core.guard import inputs_there
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from flownav.api.sensor import Sensor
 
 
+@checked
 def identify(
     logs: str | Path | Sequence[str | Path],
     *,
@@ -39,9 +41,6 @@ def identify(
         >>> 0.5 < sensor.gain.low < sensor.gain.value < sensor.gain.high < 1.5
         True
     """
-    one = isinstance(logs, str | Path)
-    if not one and not (isinstance(logs, Sequence) and all(isinstance(log, str | Path) for log in logs)):
-        raise InputError(f"logs: {type(logs).__name__} is given; a path, or a list of paths, is needed")
     paths = [Path(logs)] if isinstance(logs, str | Path) else [Path(log) for log in logs]
     require_logs(paths)
 

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array
-from flownav.core.record import POSITION_NED, VELOCITY_BODY, Column, Record
+from flownav.core.record import POSITION_NED, VELOCITY_BODY, Column, Record, mapping
+from flownav.report.panels import plotly
 from flownav.scoring.recorded import at_instants, scored_table
 
 POSITION_TITLES = ("north [m]", "east [m]", "down [m]")
@@ -89,9 +90,7 @@ def innovations(record: Record) -> Any:
 
 def path(record: Record) -> Any:
     """The path in space, east, north and height; the estimate while it is scored."""
-    import plotly.graph_objects as go
-
-    figure, spans = go.Figure(), np.zeros(3)
+    figure, spans = plotly().Figure(), np.zeros(3)
     for table, name in _paths(record):
         line = _line(record, table, name, POSITION_NED)
         if line is not None:
@@ -179,6 +178,7 @@ def _rows(title: str, titles: Sequence[str], lines: Sequence[Line]) -> Any:
 
 
 def _empty(title: str, titles: Sequence[str]) -> Any:
+    plotly()
     from plotly.subplots import make_subplots
 
     figure = make_subplots(rows=len(titles), cols=1, shared_xaxes=True, vertical_spacing=0.04)
@@ -226,7 +226,10 @@ def what_of(record: Record) -> str:
     cut = (facts.get("parameters") or {}).get("gps_outages_s") or []
     outages = f", GPS cut {len(cut)} time{'s' * (len(cut) != 1)}" if cut else ""
     lasts = f", {float(facts['duration_s']):.1f} s" if facts.get("duration_s") is not None else ""
-    return f"{facts.get('kind', '?')} {source}{seed}, filter {facts.get('filter', '?')}{outages}{lasts}"
+    parts = mapping(facts.get("parts"))
+    named = [(name, parts.get(name)) for name in ("sensors", "vehicle", "controller")]
+    own = "".join(f", own {name} {', '.join(one) if isinstance(one, list) else one}" for name, one in named if one)
+    return f"{facts.get('kind', '?')} {source}{seed}, filter {facts.get('filter', '?')}{own}{outages}{lasts}"
 
 
 def headline_of(record: Record) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, cast
 
+from flownav.api.arguments import checked
 from flownav.api.calls import writing
 from flownav.api.table import Table
 from flownav.core import record as ground
@@ -39,6 +40,7 @@ class Record(ground.Record):
         return cls(record.manifest, tables)
 
     @classmethod
+    @checked
     def load(cls, path: str | Path) -> Record:
         """Read a record that fly, replay or live wrote. InputError where the file is missing or no record.
 
@@ -156,6 +158,7 @@ class Record(ground.Record):
         )
 
     # -- what people look at -------------------------------------------------------------------------------------
+    @checked
     def plot(self, what: str = "position") -> Any:
         """A Plotly figure: "position", "velocity", "errors", "innovations" or "path".
 
@@ -170,6 +173,7 @@ class Record(ground.Record):
 
         return figure_of(self, what)
 
+    @checked
     def report(self, path: str | Path | None = None) -> Path:
         """Write the record's report: one HTML page that works offline; where it lies.
 
@@ -187,6 +191,7 @@ class Record(ground.Record):
             write_report(self, page)
         return page
 
+    @checked
     def save(self, path: str | Path, *, replacing: bool = False) -> Path:  # type: ignore[override]
         """Write the record as one file, whole or not at all; where it lies.
 
@@ -202,6 +207,7 @@ class Record(ground.Record):
             super().save(path, replacing=replacing)
         return path
 
+    @checked
     def export(self, to: str, path: str | Path | None = None, *, frame: str | None = None) -> list[Path]:
         """Write the record for another tool; the files that were written.
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from flownav.api.calls import call_of, changed, own_filter, require_path
+from flownav.api.arguments import checked
+from flownav.api.calls import call_of, changed, own_filter
 from flownav.api.record import Record
 from flownav.api.sensor import Sensor
 from flownav.core.errors import InputError
@@ -33,6 +34,7 @@ Windows = Sequence[tuple[float, float]]
 Settings = str | Path | Mapping[str, float] | None
 
 
+@checked
 def replay(
     log: str | Path,
     *,
@@ -75,11 +77,10 @@ def replay(
         "topics": None if topics is None else dict(topics),
         "filter": filter if filter is None or isinstance(filter, str) else name_of(filter),
     }  # fmt: skip
-    require_path("log", log)
     part = own_filter(filter)
     call = call_of("replay", log, **changed(replay, options))
     outages = tuple(_window(window) for window in gps_outages)
-    table = table_windows(*outage_table, option="outage_table") if outage_table else []
+    table = table_windows(*outage_table, option="outage_table") if outage_table is not None else []
     datasheet = sensor.file if isinstance(sensor, Sensor) else None if sensor is None else load_sensor(sensor)
     stated = _stated(settings)
     scale = (float(flow_scale[0]), float(flow_scale[1]))

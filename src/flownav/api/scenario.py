@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from flownav.api.arguments import checked
 from flownav.api.calls import merged, plain_entries, saved
 from flownav.api.sensor import Sensor
 from flownav.api.vehicle import Vehicle
@@ -36,6 +37,7 @@ class Scenario:
         self.file = file
 
     @classmethod
+    @checked
     def load(cls, name_or_path: str | Path) -> Scenario:
         """A shipped scenario by its name (`flownav.simulation.scenario.SHIPPED`), or a TOML file.
 
@@ -102,6 +104,7 @@ class Scenario:
             entries.pop("gps", None)  # another model has other numbers
         return Scenario(check(merged(entries, given, self.name), File, f"{self.name}, as changed"))
 
+    @checked
     def save(self, path: str | Path) -> Path:
         """Write a scenario file that `load` and `flownav fly` read; where it lies.
 

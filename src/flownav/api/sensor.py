@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from flownav.api.arguments import checked
 from flownav.api.calls import kept_file, merged
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import check, read_toml, shipped
@@ -42,6 +43,7 @@ class Sensor:
         self.file: FlowSensor = check(entries, FlowSensor, str(path or entries.get("name", "the sensor")))
 
     @classmethod
+    @checked
     def load(cls, name_or_path: str | Path = PAPER) -> Sensor:
         """The paper's sensor by its name, px4flow-paper, or a TOML file such as `flownav identify` writes.
 
@@ -110,6 +112,7 @@ class Sensor:
         """
         return "" if self.file.identification is None else self.file.identification.verdict
 
+    @checked
     def sigma_m_s(self, height_m: float) -> float:
         """Standard deviation of a velocity reading at a height [m/s].
 
@@ -135,6 +138,7 @@ class Sensor:
         """
         return Sensor(merged(self.entries, changes, self.name), None, self.findings) if changes else self
 
+    @checked
     def save(self, path: str | Path) -> Path:
         """Write the sensor file that fly, replay, campaign and live read; where it lies. InputError where it cannot be.
 
@@ -151,6 +155,7 @@ class Sensor:
         write_sensor(path, self.entries)
         return path
 
+    @checked
     def save_parameters(self, path: str | Path, autopilot: str = "px4") -> dict[str, float]:
         """Write the autopilot's parameters that follow from an identification; each by its name.
 

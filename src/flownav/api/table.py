@@ -20,6 +20,7 @@ UNITS = (
     ("_m_s2_rt_hz", "m/s2/sqrt(Hz)"), ("_rad_s2", "rad/s2"), ("_rad_s", "rad/s"), ("_deg_s", "deg/s"),
     ("_m_s2", "m/s2"), ("_m_s", "m/s"), ("_gauss", "gauss"), ("_percent", "%"), ("_rad", "rad"), ("_deg", "deg"),
     ("_hz", "Hz"), ("_kg", "kg"), ("_m2", "m2"), ("_n", "N"), ("_m", "m"), ("_s", "s"), ("_v", "V"), ("_w", "W"),
+    ("_a", "A"),
 )  # fmt: skip
 NO_UNIT = re.compile(r"q[wxyz]|sensor|component|source|kind|detail|reason|tan_.*")
 

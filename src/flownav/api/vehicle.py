@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from flownav.api.arguments import checked
 from flownav.api.calls import kept_file, merged, saved
 from flownav.core.parameter_files import read_toml
 from flownav.vehicle.kinds import AnyFile, flattened, read_kind, require_flyable, vehicle_file
@@ -30,6 +31,7 @@ class Vehicle:
         require_flyable(flattened(self.file), where)
 
     @classmethod
+    @checked
     def load(cls, name_or_path: str | Path = "maxi-joker-3") -> Vehicle:
         """A shipped vehicle (maxi-joker-3, quad-450, hexa-550), or a TOML file.
 
@@ -73,6 +75,7 @@ class Vehicle:
         """
         return Vehicle(merged(self.entries, changes, self.name)) if changes else self
 
+    @checked
     def save(self, path: str | Path) -> Path:
         """Write a vehicle file that `load` and `flownav fly --vehicle` read; where it lies.
 

@@ -13,7 +13,7 @@ from flownav.campaigns.requirement import SHIPPED, Requirement, load_requirement
 from flownav.campaigns.requirement import scenario_of as scenario_required
 from flownav.core.text import finite_or_none
 from flownav.scoring import consistency
-from flownav.scoring.errors import MAX_POSITION_ERROR, touchdown_rows
+from flownav.scoring.errors import MAX_POSITION_ERROR, attitude_rms, touchdown_rows
 from flownav.scoring.landings import REST_DISTANCE, crashed, radius, touchdown_of_flights
 from flownav.scoring.percentiles import percentile_with_interval
 from flownav.simulation.assemble import Setup, assemble
@@ -146,6 +146,7 @@ def _facts(judged: Judged, bound: consistency.ErrorSums) -> dict[str, Any]:
     axis = percentile_with_interval(judged.scores[:, MAX_POSITION_ERROR], SHARE)
     horizontal = percentile_with_interval(judged.largest_horizontal_m, SHARE)
     landings = touchdown_rows(judged.scores)
+    within = consistency.within_band(judged.groups, judged.sums)
     return {
         "crashed": int(crashed(landings).sum()),
         "touchdown": touchdown_of_flights(landings),
@@ -154,8 +155,11 @@ def _facts(judged: Judged, bound: consistency.ErrorSums) -> dict[str, Any]:
         "p95_largest_horizontal_interval_m": [finite_or_none(x) for x in horizontal[1:]],
         "rms_error": [finite_or_none(x) for x in judged.flown.root_mean_square()],
         "rms_error_at_horizon": [finite_or_none(x) for x in judged.sums.errors.root_mean_square()],
+        "rms_attitude_deg": attitude_rms(judged.attitude_deg),
         "anees": consistency.anees(judged.sums),
-        "anees_inside_fraction": consistency.inside_fraction(judged.groups),
+        "anees_inside_fraction": within.as_stated,
+        "anees_inside_fraction_sized": finite_or_none(within.sized),
+        "anees_inside_fraction_sized_at_each_step": finite_or_none(within.sized_at_each_step),
         "anees_inside_fraction_of_all_flights": consistency.inside_fraction([consistency.inside_steps(judged.sums)]),
         "error_over_stated": consistency.over_stated(judged.sums),
         "rmse_over_bound": consistency.efficiency(judged.sums.errors, bound),

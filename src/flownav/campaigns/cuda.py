@@ -100,6 +100,8 @@ class Cuda:
     script's main module must be guarded.
     """
 
+    piece = 256
+
     def __init__(self, runner: Runner | None = None, at_once: int = AT_ONCE, processes: int = 1) -> None:
         self._runner = runner or _runner()
         self._at_once, self._processes = at_once, processes

@@ -19,7 +19,9 @@ from flownav.campaigns.plan import Ready, ready_of
 from flownav.core.compile import LANES
 from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
-from flownav.simulation.engine import Instead, fly_blocks
+from flownav.simulation.block import plain_noise
+from flownav.simulation.engine import Branches, Instead, fly_blocks
+from flownav.simulation.ensemble import believed
 from flownav.simulation.plan import Flight
 
 
@@ -32,7 +34,11 @@ class Part(NamedTuple):
 
 
 class Engine(Protocol):
-    """Flies flights; the same rows whichever engine does."""
+    """Flies flights; the same rows whichever engine does. piece: flights that it flies before it gives rows back."""
+
+    @property
+    def piece(self) -> int:
+        """Flights of a piece: what is saved of a part that is being flown is whole pieces."""
 
     def fly(
         self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object]
@@ -47,6 +53,8 @@ class Local:
     check: is given each block's flight and history, and raises where they cannot be judged.
     """
 
+    piece = len(LANES)
+
     def __init__(
         self, threads: int | None = None, instead: int | None = None,
         check: Callable[[Flight, Array], None] = lambda flight, history: None,
@@ -56,26 +64,53 @@ class Local:
     def fly(
         self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object] = lambda flown: None
     ) -> Iterator[tuple[Part, Array]]:
-        """The rows of each part; parts that follow each other are flown without a pause between them."""
+        """The rows of each part; parts that follow each other are flown without a pause between them.
+
+        Where they are single flights from here and there, each block takes as many as it has lanes.
+        """
+        if len(parts) > 1 and sum(part.flights for part in parts) < len(LANES) * sum(1 for _ in neighbours(parts)):
+            yield from self._from_anywhere(cell, seed, parts, on_progress)
+            return
         for together in neighbours(parts):
             yield from self._without_pause(cell, seed, together, on_progress)
+
+    def _from_anywhere(
+        self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object]
+    ) -> Iterator[tuple[Part, Array]]:
+        flight, fault = cell.flight, cell.faults(seed)
+        numbers = [part.first + k for part in parts for k in range(part.flights)]
+
+        def instead(start: int) -> Instead:
+            lanes = [numbers[min(place, len(numbers) - 1)] for place in range(start, start + len(LANES))]
+            if cell.ensemble is None:
+                truths = [believed(flight)] * len(lanes)
+            else:
+                truths = [truth for number in lanes for truth in cell.ensemble.truths(seed, number, 1)]
+            noise = plain_noise(len(lanes))._replace(streams=np.array([lanes], np.uint64))
+            faults = fault and [fault(number) for number in lanes]
+            return Instead(Branches(truths, noise), faults, self.instead)
+
+        blocks = fly_blocks(flight, seed, 0, len(numbers), self._judge(flight), self.threads, instead=instead)
+        yield from into_parts(parts, (block for _, block in blocks), on_progress)
+
+    def _judge(self, flight: Flight) -> Callable[[Array], Array]:
+        def judge(history: Array) -> Array:
+            self.check(flight, history)
+            return rows_of(flight, history)
+
+        return judge
 
     def _without_pause(
         self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object]
     ) -> Iterator[tuple[Part, Array]]:
         flight, total = cell.flight, sum(part.flights for part in parts)
-
-        def judge(history: Array) -> Array:
-            self.check(flight, history)
-            return rows_of(flight, history)
-
         first, fault = parts[0].first, cell.faults(seed)
 
         def instead(start: int) -> Instead:
             numbers = range(first + start, first + start + len(LANES))
             return Instead(faults=fault and [fault(number) for number in numbers], take=self.instead)
 
-        blocks = fly_blocks(flight, seed, first, total, judge, self.threads, cell.ensemble, instead)
+        blocks = fly_blocks(flight, seed, first, total, self._judge(flight), self.threads, cell.ensemble, instead)
         yield from into_parts(parts, (block for _, block in blocks), on_progress)
 
 
@@ -113,6 +148,8 @@ PARTS_AHEAD = 2  # parts that wait for each core of the cluster
 
 class RayCluster:
     """address: of the cluster; None: as RAY_ADDRESS says, else a new one on this machine. InputError without Ray."""
+
+    piece = 4 * len(LANES)  # a task
 
     def __init__(self, address: str | None = None) -> None:
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")

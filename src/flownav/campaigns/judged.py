@@ -20,11 +20,12 @@ import numpy as np
 
 from flownav.campaigns.local import counted_steps, largest_horizontal_m, score_history, takeoff_history
 from flownav.core.measurement import Array, Sensor
-from flownav.core.record import POSITION_NED, VELOCITY_BODY
+from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY
 from flownav.core.text import finite, finite_or_none
 from flownav.navigation.settings_of import Told
 from flownav.navigation.told import FlowNoise
 from flownav.scoring import consistency
+from flownav.scoring.errors import attitude_block
 from flownav.sensors.flow import flow_noise_sigma
 from flownav.sensors.noise_law import constant_noise
 from flownav.simulation.assemble import Setup
@@ -47,18 +48,18 @@ class Judged:
 
     scores (flights, len(SCORE_COLUMNS)); largest_horizontal_m (flights,), in flight and relative to where the vehicle
     takes its pad to be; flown: errors in flight of what was flown on; sums: of the navigator at its horizon; groups:
-    steps inside the band, and steps, of each GROUP_FLIGHTS flights one after the other (of all where there are fewer;
-    a remainder is left out).
+    those of each GROUP_FLIGHTS flights one after the other (of all where there are fewer; a remainder is left out).
     These two are None for a filter that states no consistency. takeoffs: (flights, len(TAKEOFF_COLUMNS)), None of
-    flights that start in the air.
+    flights that start in the air. attitude_deg: (flights, 3, len(STATISTICS)), of what they flew on.
     """
 
     scores: Array
     largest_horizontal_m: Array
     flown: consistency.ErrorSums
     sums: consistency.ConsistencySums | None
-    groups: tuple[tuple[int, int], ...] | None
+    groups: tuple[consistency.ConsistencySums, ...] | None
     takeoffs: Array | None = None
+    attitude_deg: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -85,20 +86,25 @@ def fly_judged(
 
     def judge(
         history: Array,
-    ) -> tuple[Array, Array, consistency.ErrorSums, consistency.ConsistencySums | None, Array | None]:
+    ) -> tuple[Array, Array, consistency.ErrorSums, consistency.ConsistencySums | None, Array | None, Array]:
         estimate = history[:, columns("estimate", STATES)]
         truth = history[:, columns("truth", STATES)]
-        in_flight = counted_steps(flight, history) * (1.0 - _on_ground(history))
+        counted = counted_steps(flight, history)
+        in_flight = counted * (1.0 - _on_ground(history))
         flown = consistency.error_sums((estimate - truth) ** 2, _skid_height(flight, history), in_flight)
         up, largest = takeoff_history(flight, history), largest_horizontal_m(flight, history)
-        return score_history(flight, history), largest, flown, _at_horizon(flight, history), up
+        said, true = (history[:, columns(table, QUATERNION)] for table in ("estimate", "truth"))
+        turned = attitude_block(said, true, counted)
+        return score_history(flight, history), largest, flown, _at_horizon(flight, history), up, turned
 
-    rows, largest, groups, ups = [], [], [], []
+    rows, largest, groups, ups, attitudes = [], [], [], [], []
     total: consistency.ConsistencySums | None = None
     group: consistency.ConsistencySums | None = None
     flown_on: consistency.ErrorSums | None = None
-    for flown, (scores, horizontal, errors, sums, up) in fly_blocks(flight, seed, 0, flights, judge, threads, ensemble):
+    for flown, judgement in fly_blocks(flight, seed, 0, flights, judge, threads, ensemble):
+        scores, horizontal, errors, sums, up, turned = judgement
         rows.append(scores)
+        attitudes.append(turned)
         if up is not None:
             ups.append(up)
         largest.append(horizontal)
@@ -107,13 +113,14 @@ def fly_judged(
             total = sums if total is None else total + sums
             group = sums if group is None else group + sums
             if group.flights >= consistency.GROUP_FLIGHTS:
-                groups.append(consistency.inside_steps(group))
+                groups.append(group)
                 group = None
         on_progress(flown)
     assert flown_on is not None
-    in_groups = None if total is None else tuple(groups) or (consistency.inside_steps(total),)
+    in_groups = None if total is None else tuple(groups) or (total,)
     every = np.concatenate(ups) if ups else None
-    return Judged(np.concatenate(rows), np.concatenate(largest), flown_on, total, in_groups, every)
+    attitude = np.concatenate(attitudes)
+    return Judged(np.concatenate(rows), np.concatenate(largest), flown_on, total, in_groups, every, attitude)
 
 
 def _at_horizon(flight: Flight, history: Array) -> consistency.ConsistencySums | None:
@@ -158,7 +165,7 @@ def consistency_facts(judged: Judged, bound: Bound) -> dict[str, Any]:
     """What `flownav fly` says of many flights of the navigator; null where no flight flew."""
     assert judged.groups is not None
     assert judged.sums is not None
-    inside = consistency.inside_fraction(judged.groups)
+    inside = consistency.within_band(judged.groups, judged.sums).as_stated
     return {
         "rmse_over_bound": finite(consistency.efficiency(judged.sums.errors, bound.sums)),
         "anees_inside_fraction": finite_or_none(inside),

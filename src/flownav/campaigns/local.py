@@ -21,6 +21,7 @@ from flownav.scoring.landings import (
     takeoffs,
     with_reason,
 )
+from flownav.scoring.recorded import attitude_of
 from flownav.scoring.touchdown import Limits, motion_of, touchdowns
 from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.engine import Flown, fly_blocks, fly_written
@@ -179,6 +180,8 @@ def record_flown(setup: Setup, flown: Flown, seed: int, index: int, drawn: dict[
     record.manifest["scores"]["takeoff"] = None if up is None else takeoff_of_flight(up[0])
     record.add("judging", table)
     record.manifest["judging"] = facts
+    flown_on = record.tables.get("flown", record.tables["estimate"])
+    record.manifest["scores"]["attitude_deg"] = attitude_of(record, flown_on)
     record.manifest["paper"] = errors.published(setup.scenario.paper_table)
     if setup.fitted is not None:
         record.manifest["known_exactly"] = known_exactly(setup.scenario)

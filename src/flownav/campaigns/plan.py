@@ -8,6 +8,7 @@ independent of each other: a flight's inputs can be had without those of a milli
 import hashlib
 import itertools
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -218,10 +219,10 @@ def planned(
         raise InputError(f"{arg('sweep')} {both[0]}: is set as well; leave one of the two out")
     if len({scenario.name for scenario in scenarios}) < len(scenarios):
         raise InputError(f"{scenarios[0].name}: two scenarios have the same name, and the same flights; leave one out")
-    combinations = [dict(zip(names, each, strict=True)) for each in itertools.product(*sweeps.values())]
-    count = len(scenarios) * len(combinations) * len(truth_models)
+    count = len(scenarios) * len(truth_models) * math.prod(len(values) for values in sweeps.values())
     if count > MOST_CELLS:
         raise InputError(f"{arg('sweep')}: {count} combinations; at most {MOST_CELLS} are flown in one campaign")
+    combinations = [dict(zip(names, each, strict=True)) for each in itertools.product(*sweeps.values())]
     cells = tuple(
         Cell(changed(scenario, fixed | values), values, truth_model, (*fixed, *names))
         for scenario in scenarios

@@ -28,7 +28,7 @@ CLASSES = ("build", "day", "never")
 CONFIDENCE = 0.90
 RESAMPLES = 1000
 MOST_KURTOSIS = 10.0  # beyond it the ranks are ranked: few outcomes far off carry the variance
-LEAST_ROWS = 16  # rows: fewer say nothing
+LEAST_ROWS, MOST_ROWS = 16, 65_536  # rows: fewer say nothing
 Fly = Callable[[Design, int, int], Array]
 
 
@@ -74,8 +74,8 @@ def rank(entries: Mapping[str, Distribution], seed: int, n: int, fly: Fly) -> Ra
     entries: the dispersed inputs by name. n: rows, a power of 2. fly(design, first, n): the outcomes (n,) of flights
     `first` to `first + n - 1`, infinite where there was none. ValueError where n is none such.
     """
-    if n < LEAST_ROWS or n & (n - 1):
-        raise ValueError(f"{n} rows: a power of 2 is needed, {LEAST_ROWS} or more")
+    if not LEAST_ROWS <= n <= MOST_ROWS or n & (n - 1):
+        raise ValueError(f"{n} rows: a power of 2 is needed, {LEAST_ROWS} to {MOST_ROWS}")
     names = tuple(entries)
     points, column = points_of(seed, n, len(names)), {name: k for k, name in enumerate(names)}
 

@@ -14,6 +14,7 @@ from pydantic import Field, field_validator, model_validator
 from flownav.campaigns.measures import CRASH, MEASURES, NOT_LANDED
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import Number, ParameterModel, check, load, shipped
+from flownav.core.text import exactly
 from flownav.simulation.dispersion import Distribution, leaves
 from flownav.simulation.scenario import SHIPPED as SHIPPED_SCENARIOS
 from flownav.simulation.scenario import Scenario, load_scenario, with_vehicle
@@ -23,6 +24,7 @@ SHIPPED = ("takeoff", "landing", "pad_return", "approach", "approach_8_m_s")
 FOLDER = "requirements"
 OWN_SENSOR, NO_FAULT = "scenario", "none"
 NONE_OF = {CRASH: "no crash", NOT_LANDED: "a landing"}  # a measure that is 0, in words
+USUAL_SEED = 1  # what is drawn then comes of what is asked alone (`certification.cells.seed_of`)
 RANGED = "the requirement's conditions"
 
 
@@ -71,12 +73,11 @@ class RequirementTable(ParameterModel):
         """The requirement in the words of a test plan."""
         unit = MEASURES[self.measure].unit
         side = "at most" if self.upper else "at least"
-        what = f"{self.measure} {side} {self.limit:g} {unit}".rstrip()
+        what = f"{self.measure} {side} {exactly(self.limit)} {unit}".rstrip()
         if self.yes_or_no and self.upper and self.limit == 0.0:
             what = NONE_OF[self.measure]
-        return (
-            f"{what} with {100.0 * self.probability:.10g} % probability at {100.0 * self.confidence:.10g} % confidence"
-        )
+        share, sure = exactly(self.probability, 100), exactly(self.confidence, 100)
+        return f"{what} with {share} % probability at {sure} % confidence"
 
 
 class Conditions(ParameterModel):
@@ -135,7 +136,7 @@ class Requirement(ParameterModel):
     description: str = ""  # one sentence, shown in the certificate
     scenario: str  # a shipped scenario's name, or a file beside this one
     vehicle: str | None = None  # a shipped name, or a file beside this one; none: the scenario's
-    seed: int = Field(1, ge=0, lt=2**63)  # of all random draws; the same seed flies the same flights
+    seed: int = Field(USUAL_SEED, ge=0, lt=2**63)  # of all random draws; another than 1 is said to be chosen
     set: dict[str, Any] = Field(default_factory=dict)
     conditions: Conditions = Field(default_factory=Conditions)
     requirement: tuple[RequirementTable, ...] = Field(min_length=1, max_length=20)

@@ -3,19 +3,22 @@
 import ctypes
 import os
 import sys
+import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from flownav.campaigns.chain import DamagedError, root_of
 from flownav.campaigns.engines import Engine, Local, Part, RayCluster
 from flownav.campaigns.local import fly_recorded
-from flownav.campaigns.measures import Interval, enough, figure_of, looks, stop_of, values_of
+from flownav.campaigns.measures import ROW_COLUMNS, Interval, enough, figure_of, looks, stop_of, values_of
 from flownav.campaigns.plan import Plan, Ready
-from flownav.campaigns.store import PART, Dataset, Store, table_of
+from flownav.campaigns.store import PART, Dataset, Kept, Store, table_of
 from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 from flownav.core.record import Record
@@ -28,11 +31,15 @@ ENGINES = ("local", "ray", "cuda")
 LANDING, TAKEOFF = "r95_m", "p95_axis_m"  # what is followed while a campaign flies
 # parameters of glibc's mallopt (malloc.h)
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8
+SAVE_S = 10.0  # with the piece that is being flown then, no more than 20 s of flights are lost to a kill
 LARGE_BYTES = 1 << 20  # a piece of this size is asked of the system, and goes back to it when it is free
 
 
 class Progress(NamedTuple):
-    """How far a campaign is: flights flown now, in all (those found in the folder, too) and at most, and of a cell."""
+    """How far a campaign is: flights flown now, in all (those found in the folder, too) and at most, and of a cell.
+
+    damaged: the files that were not as they were written, each with what was wrong; they are flown again.
+    """
 
     flown: int
     have: int
@@ -40,6 +47,7 @@ class Progress(NamedTuple):
     cell: str
     figure: str
     interval: Interval | None
+    damaged: tuple[str, ...] = ()
 
 
 Watch = Callable[[Progress], object]
@@ -47,10 +55,11 @@ Watch = Callable[[Progress], object]
 
 def run_campaign(plan: Plan, engine: Engine, store: Store, watch: Watch = lambda progress: None) -> Dataset:
     """Fly what the folder lacks of the plan; the store is open. InputError where a cell cannot be flown."""
-    data, done = Dataset(store.folder), Counted(plan, watch)
+    done = Counted(plan, watch)
     for cell in range(len(plan.cells)):
-        _fly_cell(plan, cell, engine, store, data, done)
-    return data
+        flights = _fly_cell(plan, cell, engine, store, done)
+        store.require_no_more(cell, -(-flights // PART))
+    return Dataset(store.folder)
 
 
 class Counted:
@@ -61,6 +70,7 @@ class Counted:
         self._flown = self._have = 0
         self._cell, self._figure = 0, LANDING
         self._interval: Interval | None = None
+        self._damaged: dict[Path, str] = {}
 
     def begin(self, cell: int, figure: str) -> None:
         """The next cell, and what is followed of it."""
@@ -82,49 +92,129 @@ class Counted:
         self._interval = figure_of(self._figure, values)
         self._tell()
 
+    def damaged(self, path: Path, what: str) -> None:
+        """A file of the folder that is not as it was written."""
+        if path not in self._damaged:
+            self._damaged[path] = what
+            self._tell()
+
     def _tell(self) -> None:
         label, most = self._plan.cells[self._cell].label, self._plan.flights * len(self._plan.cells)
-        self._watch(Progress(self._flown, self._have, most, label, self._figure, self._interval))
+        damaged = tuple(f"{path}: is damaged ({what})" for path, what in self._damaged.items())
+        self._watch(Progress(self._flown, self._have, most, label, self._figure, self._interval, damaged))
 
 
-def _fly_cell(plan: Plan, cell: int, engine: Engine, store: Store, data: Dataset, done: Counted) -> None:
-    """One cell, look by look: the parts that are missing, and whether the flights are enough."""
+@dataclass
+class Link:
+    """How far the chain of a cell's digests has come."""
+
+    digest: bytes
+
+
+def _fly_cell(plan: Plan, cell: int, engine: Engine, store: Store, done: Counted) -> int:
+    """One cell, look by look: the parts that are missing, and whether the flights are enough; how many they are."""
     ready = plan.ready(cell)
     stop = stop_of(plan.until) if plan.until else None
     figure = stop.figure if stop else followed(ready)
     done.begin(cell, figure)
     values: list[Array] = []
+    link = Link(root_of(plan.as_json, cell))
     for look in looks(plan.flights) if stop else [plan.flights]:
         known = sum(map(len, values))
-        for part, rows in _parts_until(plan, cell, range(known, look), ready, engine, store, data, done):
+        for part, rows in _parts_until(plan, cell, range(known, look), ready, engine, store, link, done):
             values.append(values_of(figure, rows))
             if part.number % 8 == 0:
                 done.estimate(np.concatenate(values))
         values = [np.concatenate(values)]
         done.estimate(values[0])
         if stop and enough(stop, values[0], plan.flights) is not None:
-            return
+            break
+    return len(values[0])
 
 
 def _parts_until(
-    plan: Plan, cell: int, flights: range, ready: Ready, engine: Engine, store: Store, data: Dataset, done: Counted
+    plan: Plan, cell: int, flights: range, ready: Ready, engine: Engine, store: Store, link: Link, done: Counted
 ) -> Iterator[tuple[Part, Array]]:
-    """The parts of a cell's flights: those of the folder, then those that were missing, flown."""
+    """The parts of a cell's flights in their order: those of the folder, and those that it lacks, flown."""
     own, end = plan.cells[cell].first, flights.stop
-    parts = [Part(start // PART, own + start, min(PART, end - start)) for start in range(flights.start, end, PART)]
-    missing = []
+    waiting = [Part(start // PART, own + start, min(PART, end - start)) for start in range(flights.start, end, PART)]
+    while waiting:
+        found = _found(store, cell, waiting[0], link.digest, done)
+        if found is not None:
+            link.digest = found.last
+            done.found(waiting[0].flights)
+            store.forget_begun(cell, waiting[0].number)
+            yield waiting.pop(0), found.rows
+            continue
+        missing = [waiting.pop(0)]
+        while waiting and _found(store, cell, waiting[0], None, done) is None:
+            missing.append(waiting.pop(0))
+        for part, rows in _flown(plan, cell, missing, ready, engine, store, link, done):
+            drawn = ready.ensemble.values(plan.seed, part.first, part.flights) if ready.ensemble else {}
+            table = table_of(cell, plan.cells[cell].values, part.first, rows, drawn)
+            link.digest = store.write(cell, part.number, table, link.digest)
+            store.forget_begun(cell, part.number)
+            yield part, rows
+
+
+def _flown(
+    plan: Plan, cell: int, missing: list[Part], ready: Ready, engine: Engine, store: Store, link: Link, done: Counted
+) -> Iterator[tuple[Part, Array]]:
+    """The parts that are missing, flown in pieces; what has flown of a part is saved every SAVE_S.
+
+    The first goes on behind the flights that were saved of it.
+    """
+    begun = _begun(store, cell, missing[0], link.digest, done)
+    done.found(len(begun))
+    rows, have, saved_s = [begun], len(begun), time.monotonic()
+    waiting = deque(missing)
+    for piece, more in engine.fly(ready, plan.seed, list(_pieces(missing, have, engine.piece)), done.flown):
+        part = waiting[0]
+        rows.append(more)
+        have += piece.flights
+        if have == part.flights:
+            yield waiting.popleft(), np.concatenate(rows)
+            rows, have, saved_s = [], 0, time.monotonic()
+        elif time.monotonic() - saved_s >= SAVE_S:
+            store.write_begun(cell, part.number, np.concatenate(rows), link.digest)
+            saved_s = time.monotonic()
+
+
+def _pieces(parts: list[Part], have: int, most: int) -> Iterator[Part]:
+    """Parts cut into pieces of at most so many flights, without the first `have` flights of the first part."""
     for part in parts:
-        if store.rows_in(cell, part.number) == part.flights:
-            done.found(part.flights)
-            yield part, data.rows_of_part(cell, part.number)
-        else:
-            missing.append(part)
-    if not missing:
-        return
-    for part, rows in engine.fly(ready, plan.seed, missing, done.flown):
-        drawn = ready.ensemble.values(plan.seed, part.first, part.flights) if ready.ensemble else {}
-        store.write(cell, part.number, table_of(cell, plan.cells[cell].values, part.first, rows, drawn))
-        yield part, rows
+        for start in range(have, part.flights, most):
+            yield Part(part.number, part.first + start, min(most, part.flights - start))
+        have = 0
+
+
+def _begun(store: Store, cell: int, part: Part, before: bytes, done: Counted) -> Array:
+    """What was saved of a part that follows this digest, (flights, len(ROW_COLUMNS)); of no flight where nothing was.
+
+    What is damaged is told of and flown again.
+    """
+    try:
+        kept = store.begun(cell, part.number)
+    except DamagedError as error:
+        done.damaged(store.begun_path(cell, part.number), str(error))
+        kept = None
+    whole = kept is not None and kept.before == before and len(kept.rows) < part.flights
+    return kept.rows if kept is not None and whole else np.zeros((0, len(ROW_COLUMNS)))
+
+
+def _found(store: Store, cell: int, part: Part, before: bytes | None, done: Counted) -> Kept | None:
+    """A part that the folder has as it was written; None where it has none. before: the digest that it must follow.
+
+    One that is damaged is told of, once.
+    """
+    try:
+        kept = store.kept(cell, part.number, part.flights)
+        if kept is not None and before is not None and kept.before != before:
+            raise DamagedError("it does not follow the part before it")
+    except DamagedError as error:
+        done.damaged(store.path_of(cell, part.number), str(error))
+        return None
+    return kept
 
 
 def followed(ready: Ready) -> str:

@@ -2,10 +2,12 @@
 
     campaign.json                        the plan, by which a folder is known again
     flights/cell-000/part-00000.parquet  flights 0 to 255 of the first cell, and so on
+    flights/cell-000/begun-00001.parquet scores of the first flights of a part that is being flown, until it is there
     summary.json, report.html, records/  written at the end
 
 Each file appears whole or not at all, and what is in it follows from the plan alone: a campaign that was killed goes on
-where it stopped, and ends with the same bytes as one that was not.
+where it stopped, and ends with the same bytes as one that was not. Its rows say whether they are as they were written
+(`campaigns.chain`): a part that is not is named, and flown again.
 """
 
 from __future__ import annotations
@@ -17,16 +19,19 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.campaigns.chain import DIGEST, DamagedError, read_checked, read_part, write_part
 from flownav.campaigns.measures import ROW_COLUMNS, measured
 from flownav.campaigns.plan import Plan
+from flownav.core import arrow_columns
+from flownav.core.arrow_columns import as_numpy, numbers, words
 from flownav.core.errors import InputError, arg
 from flownav.core.files import written_whole
-from flownav.core.guard import an_output_folder
+from flownav.core.guard import an_output_folder, object_in
 from flownav.core.measurement import Array
 from flownav.scoring.errors import SCORE_COLUMNS, touchdown_rows
 from flownav.scoring.landings import BROKEN, verdict_of
@@ -37,6 +42,14 @@ PLAN, FLIGHTS, SUMMARY, REPORT, RECORDS, LOCK = (
 )  # fmt: skip
 PART = 256  # flights of one file
 PART_NAME = re.compile(r"part-(\d{5,})\.parquet")
+
+
+class Kept(NamedTuple):
+    """A part as it was written: its scores (flights, len(ROW_COLUMNS)), the digests before it and of its last row."""
+
+    rows: Array
+    before: bytes
+    last: bytes
 
 
 class Store:
@@ -100,31 +113,65 @@ class Store:
         """Where the flights of a part lie."""
         return part_path(self.folder, cell, part)
 
-    def rows_in(self, cell: int, part: int) -> int:
-        """How many flights of a part are there; 0 where there is none that can be read."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
+    def kept(self, cell: int, part: int, flights: int) -> Kept | None:
+        """A part's rows, where it has so many flights; None where it is not there, or has fewer.
 
-        try:
-            return int(pq.read_metadata(self.path_of(cell, part)).num_rows)
-        except (OSError, pa.ArrowException):
-            return 0
+        DamagedError where it is not as it was written.
+        """
+        path = self.path_of(cell, part)
+        if not path.exists():
+            return None
+        found = read_part(path)
+        rows = len(found.table)
+        if rows < flights:
+            return None
+        if rows > flights:
+            raise DamagedError(f"it has {rows} flights, not {flights}")
+        return Kept(rows_of_table(found.table), found.before, found.last)
 
-    def write(self, cell: int, part: int, table: Any) -> None:
-        """Keep a part."""
-        import pyarrow.parquet as pq
+    def require_no_more(self, cell: int, parts: int) -> None:
+        """InputError where a cell's folder has flights that are not the plan's, which has so many parts."""
+        known = [part_path(self.folder, cell, number) for number in range(parts)]
+        strange = next((path for path in Dataset(self.folder).parts(cell) if path not in known), None)
+        if strange is not None:
+            raise InputError(f"{strange}: holds flights that this campaign has not; move it away")
 
+    def write(self, cell: int, part: int, table: Any, before: bytes) -> bytes:
+        """Keep a part whose first row follows this digest; the digest of its last."""
         with written_whole(self.path_of(cell, part)) as temporary:
-            pq.write_table(table, temporary, compression="zstd", use_dictionary=["verdict", "limited_by"])
+            return write_part(temporary, table, before, texts=["verdict", "limited_by"])
+
+    def begun_path(self, cell: int, part: int) -> Path:
+        """Where the first flights of a part lie while it is being flown."""
+        return part_path(self.folder, cell, part, "begun")
+
+    def begun(self, cell: int, part: int) -> Kept | None:
+        """What was saved of a part that is not there. DamagedError where that is not as it was written."""
+        path = self.begun_path(cell, part)
+        if not path.exists():
+            return None
+        found = read_part(path)
+        if found.table.column_names != list(ROW_COLUMNS):
+            raise DamagedError("it has other columns")
+        return Kept(rows_of_table(found.table), found.before, found.last)
+
+    def write_begun(self, cell: int, part: int, rows: Array, before: bytes) -> None:
+        """Save the scores of a part's first flights, which follow this digest, (flights, len(ROW_COLUMNS))."""
+        with written_whole(self.begun_path(cell, part)) as temporary:
+            write_part(temporary, arrow_columns.table_of(dict(zip(ROW_COLUMNS, rows.T, strict=True))), before)
+
+    def forget_begun(self, cell: int, part: int) -> None:
+        """Remove what was saved of a part that is now there."""
+        self.begun_path(cell, part).unlink(missing_ok=True)
 
     def keep_text(self, name: str, text: str) -> Path:
         """Keep a text beside the flights."""
         return _write_text(self.folder / name, text)
 
 
-def part_path(folder: Path, cell: int, part: int) -> Path:
+def part_path(folder: Path, cell: int, part: int, kind: str = "part") -> Path:
     """Where the flights of a part lie."""
-    return folder / FLIGHTS / f"cell-{cell:03d}" / f"part-{part:05d}.parquet"
+    return folder / FLIGHTS / f"cell-{cell:03d}" / f"{kind}-{part:05d}.parquet"
 
 
 class Dataset:
@@ -144,26 +191,33 @@ class Dataset:
         """A cell's flights as an Arrow table, flight by flight."""
         import pyarrow as pa
 
-        tables = [read(path, columns) for path in self.parts(cell)]
+        tables = [self._read(path, columns) for path in self.parts(cell)]
         return pa.concat_tables(tables).unify_dictionaries() if tables else pa.table({})
 
     def column(self, cell: int, name: str) -> NDArray[Any]:
         """One column of a cell, (flights,)."""
-        return column(self.table(cell, [name]), name)
+        return as_numpy(self.table(cell, [name]).column(name))
 
     def rows(self, cell: int) -> Array:
         """The scores of a cell, (flights, len(ROW_COLUMNS)): flights in order."""
-        table = self.table(cell, list(ROW_COLUMNS))
-        return np.column_stack([column(table, name) for name in ROW_COLUMNS])
-
-    def rows_of_part(self, cell: int, part: int) -> Array:
-        """The scores of one file."""
-        table = read(part_path(self.folder, cell, part), ROW_COLUMNS)
-        return np.column_stack([column(table, name) for name in ROW_COLUMNS])
+        return rows_of_table(self.table(cell, list(ROW_COLUMNS)))
 
     def scores(self, cell: int) -> Array:
         """Scores of the flights, (flights, len(SCORE_COLUMNS))."""
         return self.rows(cell)[:, : len(SCORE_COLUMNS)]
+
+    def _read(self, path: Path, columns: list[str] | None) -> Any:
+        """A file's columns; all but the digests where none are named. InputError where it is damaged."""
+        try:
+            table = read_checked(path, columns)
+        except DamagedError as error:
+            raise InputError(f"{path}: is damaged ({error}); the command that flew it flies it again") from None
+        return table if columns is not None or DIGEST not in table.column_names else table.drop_columns([DIGEST])
+
+
+def rows_of_table(table: Any) -> Array:
+    """The scores of a table's flights, (flights, len(ROW_COLUMNS))."""
+    return np.column_stack([as_numpy(table.column(name)) for name in ROW_COLUMNS])
 
 
 def _is_more_of(known: dict[str, Any], asked: dict[str, Any], differs: list[str]) -> bool:
@@ -175,62 +229,13 @@ def _is_more_of(known: dict[str, Any], asked: dict[str, Any], differs: list[str]
 
 def plan_in(folder: Path) -> dict[str, Any]:
     """What a folder says of its campaign. InputError where it says nothing that can be read."""
-    try:
-        said = json.loads((folder / PLAN).read_bytes())
-    except (OSError, ValueError) as error:
-        raise InputError(f"{folder / PLAN}: cannot be read ({error}); give another name") from None
-    if not isinstance(said, dict):
-        raise InputError(f"{folder / PLAN}: is no campaign's; give another name")
-    return said
+    return object_in(folder / PLAN, "give a campaign's folder, or another name")
 
 
 def _write_text(path: Path, text: str) -> Path:
     with written_whole(path) as temporary:
         temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
     return path
-
-
-# -- columns between NumPy and Arrow -----------------------------------------------------------------------------
-KINDS = {"d": "float64", "i": "int32", "l": "int64", "?": "bool"}
-
-
-def numbers(values: NDArray[Any]) -> Any:
-    """An Arrow array of a NumPy array of float64, int32 or int64, (rows,), which it keeps alive."""
-    import pyarrow as pa
-
-    values = np.ascontiguousarray(values)
-    kind = getattr(pa, KINDS[values.dtype.char])()
-    return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(values)])
-
-
-def words(values: Sequence[str]) -> Any:
-    """An Arrow array of words, each kept once."""
-    import pyarrow as pa
-
-    known = {word: place for place, word in enumerate(dict.fromkeys(values))}
-    text = [word.encode() for word in known]
-    ends = np.concatenate([[0], np.cumsum([len(word) for word in text])]).astype(np.int32)
-    book = pa.Array.from_buffers(pa.utf8(), len(text), [None, pa.py_buffer(ends), pa.py_buffer(b"".join(text))])
-    return pa.DictionaryArray.from_arrays(numbers(np.array([known[word] for word in values], np.int32)), book)
-
-
-def column(table: Any, name: str) -> NDArray[Any]:
-    """A column as NumPy, (rows,): numbers, or words as objects. KeyError without it."""
-    if str(table.schema.field(name).type).startswith("dictionary"):
-        return np.array(table.column(name).to_pylist(), object)
-    parts = []
-    for chunk in table.column(name).chunks:
-        kind = np.dtype(str(chunk.type).replace("double", "float64"))
-        parts.append(np.frombuffer(chunk.buffers()[1], kind, len(chunk), chunk.offset * kind.itemsize))
-    return np.concatenate(parts) if parts else np.zeros(0)
-
-
-def read(path: Path, columns: Sequence[str] | None = None) -> Any:
-    """A Parquet file's columns as a table."""
-    import pyarrow.parquet as pq
-
-    with pq.ParquetFile(path) as file:
-        return file.read(list(columns) if columns is not None else None)
 
 
 # -- a flight as a row -------------------------------------------------------------------------------------------

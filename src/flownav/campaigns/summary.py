@@ -7,10 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaigns import measures, store
+from flownav.campaigns import measures
 from flownav.campaigns.plan import Plan
 from flownav.campaigns.run import LANDING, TAKEOFF
 from flownav.campaigns.store import INPUT, Dataset
+from flownav.core.arrow_columns import as_numpy
 from flownav.core.measurement import Array
 from flownav.core.text import finite_or_none
 from flownav.scoring.errors import SCORE_COLUMNS, touchdown_rows
@@ -128,7 +129,7 @@ def inputs_of(data: Dataset, cell: int) -> dict[str, Array]:
     """The dispersed numbers of a cell's flights by name, each (flights,)."""
     table = data.table(cell)
     names = [name for name in table.column_names if name.startswith(INPUT)]
-    return {name.removeprefix(INPUT): store.column(table, name) for name in names}
+    return {name.removeprefix(INPUT): as_numpy(table.column(name)) for name in names}
 
 
 # -- views of a cell ---------------------------------------------------------------------------------------------

@@ -3,8 +3,9 @@
 import io
 import re
 import sys
+from collections.abc import Iterable
 from importlib import import_module
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,56 +14,52 @@ from flownav.core.errors import FlownavError, InputError
 from flownav.core.guard import a_run
 from flownav.core.version import __version__
 
-DONE, BAD_VERDICT, BAD_INPUT = 0, 1, 2  # Ctrl-C: 130, as shells have it
+DONE, BAD_VERDICT, BAD_INPUT, BROKEN_OFF = 0, 1, 2, 130  # the last of Ctrl-C, as shells have it
 # commands that share a module, and the function that each is there; any other is `command` of a module of its name
 ELSEWHERE = {
     "report": ("records", "report"), "view": ("records", "view"), "export": ("records", "export_to"),
     "recover": ("records", "recover"), "schema": ("bench", "schema"), "tune": ("compare", "tune_settings"),
     "sample": ("rig", "sample"), "info": ("replay", "info"), "flow": ("identify", "flow"),
-    "validate": ("paper", "validate"), "envelope": ("campaign", "envelope"),
+    "validate": ("paper", "validate"), "envelope": ("campaign", "envelope"), "verify": ("build", "verify"),
 }  # fmt: skip
 # options that are not called as the argument in Python is, without its unit
 OPTIONS = {
     "autopilot": "--for", "factor": "--bin", "gps_outages": "--gps-outage", "original": "--merge", "topics": "--topic",
     "url": "--mavlink",
 }  # fmt: skip
-app = typer.Typer(
-    name="flownav",
-    help="GPS/INS + optical-flow navigation for precision VTOL take-off and landing.",
-    no_args_is_help=True,
-    add_completion=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
-for name, what in (
-    ("fly", "Fly a take-off or landing in closed loop, scored beside the paper."),
-    ("replay", "Fuse a recorded flight; measure the drift without GPS."),
-    ("compare", "Many logs, many settings, beside dead reckoning and the autopilot."),
-    ("tune", "Propose settings from logs, judged on windows held out from the fit."),
-    ("live", "Navigate a MAVLink vehicle in real time; send it the estimate."),
-    ("sample", "Write small simulated logs, to try the other commands on."),
-    ("recover", "Make the record of a live session that was killed."),
-    ("info", "What a log holds: sensors, rates, gaps, signs, what it lacks."),
-    ("identify", "Identify a flow sensor from rig or flight logs; write its file."),
-    ("rig", "Swing a flow sensor over a pad beside an encoder, from pixels."),
-    ("flow", "Optical flow of your own frames, as the PX4FLOW computes it."),
-    ("pad", "Find the landing pad in a frame; measure how well, by height."),
-    ("paper", "Every table of the paper, published and reproduced side by side."),
-    ("campaign", "Fly a scenario many times: accuracy with intervals, rare events."),
-    ("certify", "Pass, fail or not shown: a requirement flown, as a page to be signed."),
-    ("accuracy", "The landing filter against its targets, and what its pieces are worth."),
-    ("envelope", "How surely a scenario lands, by the wind's speed and direction."),
-    ("faults", "Let sensors fail on a landing: when it is noticed, what it costs."),
-    ("validate", "Hold the simulator against recorded flights, figure beside figure."),
-    ("vehicle", "Trim, power, linear models and ground effect of a helicopter."),
-    ("report", "Write a record's report as one HTML page."),
-    ("view", "Show a record in space and time with Rerun, or write its .rrd."),
-    ("export", "Write a record as MCAP, TUM, EuRoC, Parquet, CSV, ULog, KML or GPX."),
-    ("schema", "Print the JSON schema of a command's output or of a file."),
-    ("bench", "Measure how fast all of this is on your machine."),
-):
-    module, function = ELSEWHERE.get(name, (name, "command"))
-    app.command(name, short_help=what)(getattr(import_module(f"flownav.cli.{module}"), function))
+if TYPE_CHECKING:
+    app: typer.Typer
+COMMANDS = {  # by name, as the help lists them
+    "fly": "Fly a take-off or landing in closed loop, scored beside the paper.",
+    "replay": "Fuse a recorded flight; measure the drift without GPS.",
+    "compare": "Many logs, many settings, beside dead reckoning and the autopilot.",
+    "tune": "Propose settings from logs, judged on windows held out from the fit.",
+    "live": "Navigate a MAVLink vehicle in real time; send it the estimate.",
+    "sitl": "Fly a real autopilot's simulator on flownav; faults; scored.",
+    "sample": "Write small simulated logs, to try the other commands on.",
+    "recover": "Make the record of a live session that was killed.",
+    "info": "What a log holds: sensors, rates, gaps, signs, what it lacks.",
+    "explain": "Why a log drifted: the first cause, its evidence, what cures it.",
+    "identify": "Identify a flow sensor from rig or flight logs; write its file.",
+    "rig": "Swing a flow sensor over a pad beside an encoder, from pixels.",
+    "flow": "Optical flow of your own frames, as the PX4FLOW computes it.",
+    "pad": "Find the landing pad in a frame; measure how well, by height.",
+    "paper": "Every table of the paper, published and reproduced side by side.",
+    "campaign": "Fly a scenario many times: accuracy with intervals, rare events.",
+    "certify": "Pass, fail or not shown: a requirement flown, as a page to be signed.",
+    "accuracy": "The landing filter against its targets, and what its pieces are worth.",
+    "envelope": "How surely a scenario lands, by the wind's speed and direction.",
+    "faults": "Let sensors fail on a landing: when it is noticed, what it costs.",
+    "validate": "Hold the simulator against recorded flights, figure beside figure.",
+    "vehicle": "Trim, power, linear models and ground effect of a helicopter.",
+    "report": "Write a record's report as one HTML page.",
+    "view": "Show a record in space and time with Rerun, or write its .rrd.",
+    "export": "Write a record as MCAP, TUM, EuRoC, Parquet, CSV, ULog, KML or GPX.",
+    "build": "The navigator as a library: flight controller, companion, browser.",
+    "verify": "Compare what a board or a browser says with replay, bit for bit.",
+    "schema": "Print the JSON schema of a command's output or of a file.",
+    "bench": "Measure how fast all of this is on your machine.",
+}
 
 
 def say_version(asked: bool) -> None:
@@ -72,7 +69,6 @@ def say_version(asked: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def about(
     version: Annotated[
         bool, typer.Option("--version", help="Print the version and nothing else.", is_eager=True, callback=say_version)
@@ -81,9 +77,39 @@ def about(
     """GPS/INS + optical-flow navigation for precision VTOL take-off and landing."""
 
 
+def made(names: Iterable[str]) -> typer.Typer:
+    """The command line with these commands."""
+    app = typer.Typer(
+        name="flownav",
+        help="GPS/INS + optical-flow navigation for precision VTOL take-off and landing.",
+        no_args_is_help=True,
+        add_completion=True,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+    )
+    app.callback()(about)
+    for name in names:
+        module, function = ELSEWHERE.get(name, (name, "command"))
+        app.command(name, short_help=COMMANDS[name])(getattr(import_module(f"flownav.cli.{module}"), function))
+    return app
+
+
+def __getattr__(name: str) -> Any:
+    """`app`, the command line with every command, made when it is first asked for."""
+    if name != "app":
+        raise AttributeError(f"module 'flownav.cli' has no attribute {name!r}")
+    globals()["app"] = whole = made(COMMANDS)
+    return whole
+
+
+def asked() -> typer.Typer:
+    """The command line with the command that is named alone, or all: making all takes as long as a short one runs."""
+    return made(sys.argv[1:2] if COMMANDS.keys() & set(sys.argv[1:2]) else COMMANDS)
+
+
 def main() -> None:
-    """Entry point: exit status 0 done, 1 a bad verdict, 2 a mistake of the user's (one line), 130 broken off."""
-    run(app)
+    """Run what is asked: exit status 0 done, 1 a bad verdict, 2 a mistake of the user's (one line), 130 broken off."""
+    run(asked())
 
 
 def run(app: typer.Typer) -> None:
@@ -102,6 +128,10 @@ def run(app: typer.Typer) -> None:
         _leave_usage(error)
     except typer.Abort:
         _leave("broken off", BAD_VERDICT)
+    except KeyboardInterrupt:  # before or behind the command
+        sys.exit(BROKEN_OFF)
+    except MemoryError:
+        _leave("there is not enough memory for this; give less at once", BAD_INPUT)
     except OSError as error:  # a disk that is full, a file that went away
         _leave(f"{error.filename or 'a file'}: {error.strerror or error}", BAD_INPUT)
     sys.exit(status if isinstance(status, int) else DONE)

@@ -10,7 +10,7 @@ import typer
 
 from flownav.cli import options
 from flownav.cli.options import chosen, option, out_option, words
-from flownav.cli.output import Column, answer, figure, place, progress, require_between, with_ends, write_text
+from flownav.cli.output import Column, answer, figure, place, progress, require_between, with_ends
 from flownav.core.errors import VerdictError
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 CASES = "Which cases, repeated or with commas."
 LACKING = "Flights of each variant that lacks a piece of the navigator; 0 for none."
 STATES = ("x", "y", "z", "u", "v", "w")
+ATTITUDE = ("roll", "pitch", "yaw")
 TRUTH_MODELS = ("matched", "ensemble")
 BOUND = "RMSE over the bound of the filter's own model"
 
@@ -36,6 +37,8 @@ def command(
     """Hold the navigator against its targets, matched and as an ensemble; what its pieces are worth, matched."""
     from flownav.campaigns.accuracy import CASES as EVERY
     from flownav.campaigns.accuracy import flights_of, run_case
+    from flownav.core.guard import write_text
+    from flownav.core.marks import XML
 
     require_between("--flights", flights, 1, 1_000_000)
     require_between("--ablations", ablations, 0, 1_000_000)
@@ -46,7 +49,7 @@ def command(
         made = [run_case(name, seed, flights, ablations, advance, vehicle) for name in named]
     text = markdown(made)
     if path is not None:
-        write_text(path, text)
+        write_text(text, path, XML)
     facts: dict[str, Any] = {"flights": flights, "ablation_flights": ablations, "seed": seed}
     facts |= {"cases": [case.as_json() for case in made]} | ({"out": str(path)} if path else {})
     answer(facts, as_json, lambda: typer.echo(text))
@@ -59,7 +62,7 @@ def markdown(made: list[Case]) -> str:
     """The tables as they are printed and as docs/explanation/accuracy.md has them."""
     parts = [_targets(made), _known(made)]
     parts += [table(made, model) for table in (_accuracy, _touchdowns, _consistency) for model in TRUTH_MODELS]
-    parts += [_over_stated(made), _by_height(made)]
+    parts += [_over_stated(made), _could_be(made), _by_height(made)]
     parts += [_ablations(case) for case in made if case.ablations]
     return "\n\n".join(parts) + "\n"
 
@@ -91,14 +94,17 @@ def _consistency(made: list[Case], truth_model: str) -> str:
 
 
 def _accuracy(made: list[Case], truth_model: str) -> str:
-    what = f"{truth_model}: RMSE of what was flown on, in flight [m, m/s]"
+    what = f"{truth_model}: RMSE of the autopilot's input, in flight [m, m/s, °]"
     largest = ("p95 of largest error of one axis [m]", "p95 of largest horizontal error [m] (95 % interval)")
     rows = []
     for case in made:
         facts = getattr(case, truth_model)
         errors, axis = (_length(rms) for rms in facts["rms_error"]), _length(facts["p95_largest_axis_m"])
-        rows.append((case.name, *errors, axis, _interval(facts, "p95_largest_horizontal"), str(facts["crashed"])))
-    return _table((what, *STATES, *largest, "crashed"), rows)
+        turned = (figure(rms, ".2f") for rms in facts["rms_attitude_deg"].values())
+        rows.append(
+            (case.name, *errors, *turned, axis, _interval(facts, "p95_largest_horizontal"), str(facts["crashed"]))
+        )
+    return _table((what, *STATES, *ATTITUDE, *largest, "crashed"), rows)
 
 
 def _touchdowns(made: list[Case], truth_model: str) -> str:
@@ -127,6 +133,17 @@ def _over_stated(made: list[Case]) -> str:
         for case in made for model in TRUTH_MODELS
     ]  # fmt: skip
     return _table(("RMS of the error over what is stated of it, at the horizon", "truth", *STATES), rows)
+
+
+def _could_be(made: list[Case]) -> str:
+    """What the band asks of a filter: how large its covariance is stated, and when."""
+    shares = ("anees_inside_fraction", "anees_inside_fraction_sized", "anees_inside_fraction_sized_at_each_step")
+    rows = [
+        (case.name, model, f"{facts['anees']:.2f}", *(figure(facts[share], ".2f") for share in shares))
+        for case in made for model in TRUTH_MODELS for facts in [getattr(case, model)]
+    ]  # fmt: skip
+    heading = ("share of the steps in flight in the band", "truth", "ANEES", "as stated")
+    return _table((*heading, "were the case's size right", "were each step's size right"), rows)
 
 
 def _by_height(made: list[Case]) -> str:

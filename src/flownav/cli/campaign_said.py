@@ -40,7 +40,7 @@ def figure_words(progress: CampaignProgress) -> str:
 
 @contextmanager
 def watching(plan: Plan) -> Iterator[Callable[[CampaignProgress], None]]:
-    """A bar on standard error, which the value moves on."""
+    """A bar on standard error, which the value moves on; above it a line for every damaged file that is flown again."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn, TimeRemainingColumn
     from rich.text import Text
@@ -58,9 +58,13 @@ def watching(plan: Plan) -> Iterator[Callable[[CampaignProgress], None]]:
     )  # fmt: skip
     total = plan.flights * len(plan.cells)
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=total, cell=plan.cells[0].label, figure="")
+        task, told = bar.add_task("", total=total, cell=plan.cells[0].label, figure=""), set[str]()
 
         def show_progress(how_far: CampaignProgress) -> None:
+            for line in how_far.damaged:
+                if line not in told:
+                    told.add(line)
+                    bar.console.print(f"flownav: {line}; its flights are flown again", markup=False, soft_wrap=True)
             words = figure_words(how_far)
             bar.update(task, completed=how_far.have, total=how_far.most, cell=how_far.cell, figure=words)
 

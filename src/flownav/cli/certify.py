@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from flownav.cli import options
 from flownav.cli.options import argument, option, out_option, switch
@@ -15,10 +15,15 @@ if TYPE_CHECKING:
     from flownav.campaigns.plan import Plan
     from flownav.campaigns.requirement import Requirement
 
+MOST_FLIGHTS = 100_000_000
 WIDE = 150  # columns of the tables
 FILE = "a requirement's FILE.toml"
 RANKING = "Rows of the ranking of inputs, a power of 2, for each input; 0: none."
 FLIGHTS = "as many as the requirement needs"
+AGAIN = "Fly so many of the flights again, drawn at random; they must be the same to the bit."
+SIGN = "Sign the certificate with this Ed25519 key (PEM or OpenSSH); extra `sign`."
+VERIFY = "Look a certificate's folder through: files, rows, figures, flights."
+KEY = "With --verify: the signer's public key."
 PLAN = (
     Column("requirement", "requirement"),
     Column("flights with 0 failures", lambda row: str(row["needed"]["0"])),
@@ -27,6 +32,7 @@ PLAN = (
     Column("failures allowed", "allowed_failures"),
     Column("flights", "flights"),
 )
+CHECKED = (Column("looked at", "what"), Column("found", "found"), Column("", "said"))
 JUDGED = (
     Column("requirement", "sentence"),
     Column("failed", lambda one: f"{one['failures']} of {one['flights']} ({_allowed(one)})"),
@@ -36,65 +42,120 @@ JUDGED = (
     Column("verdict", "verdict"),
 )
 
+Requirements = Annotated[
+    str | None,
+    argument("REQUIREMENT", "What to show", *options.REQUIREMENTS, beside=FILE, default="none with --verify"),
+]
+
 
 def command(
-    requirement: Annotated[str, argument("REQUIREMENT", "What to show", *options.REQUIREMENTS, beside=FILE)],
+    requirement: Requirements = None,
     plan_only: Annotated[bool, switch("Only say how many flights are needed.", "--plan")] = False,
     flights: Annotated[int | None, option("N", "How many flights.", unset=FLIGHTS)] = None,
     ranking: Annotated[int, option("N", RANKING)] = 64,
     records: options.Records = 3,
     vehicle: options.Vehicle = None,
     engine: options.Engine = "local",
+    again: Annotated[int, option("N", AGAIN)] = 64,
+    sign: Annotated[Path | None, option("KEY", SIGN)] = None,
+    verify: Annotated[Path | None, option("DIR", VERIFY)] = None,
+    key: Annotated[Path | None, option("KEY", KEY)] = None,
     out: Annotated[Path | None, out_option(f"The folder; {options.KEPT}", "out/NAME_certificate")] = None,
     as_json: options.Json = False,
 ) -> None:
-    """Fly what a requirement asks for: pass, fail or not shown, with its risk; exit status 1 unless it passes."""
+    """Fly what a requirement asks for: pass, fail or not shown, with its risk; exit status 1 unless it passes.
+
+    With --verify a certificate is held against its folder instead, and exit status 1 says that it does not hold.
+    """
     from flownav.campaigns.certification.cells import plan_of
     from flownav.campaigns.certification.certify import FLIGHTS_TOLD
-    from flownav.campaigns.ranking import LEAST_ROWS
+    from flownav.campaigns.certification.signing import private_key
+    from flownav.campaigns.ranking import LEAST_ROWS, MOST_ROWS
     from flownav.campaigns.requirement import load_requirement
     from flownav.campaigns.run import engine_named, require_engine
 
+    require_between("--again", again, 1, MOST_FLIGHTS)
+    if verify is not None:
+        _verify(verify, requirement, again, key, as_json)
+        return
+    if key is not None:
+        raise InputError("--key: is held against a certificate with --verify; give --sign to sign one")
+    if requirement is None:
+        raise InputError(f"REQUIREMENT: give one of {', '.join(options.REQUIREMENTS)}, or {FILE}")
     if flights is not None:
-        require_between("--flights", flights, 1, 100_000_000)
-    if ranking and (ranking & (ranking - 1) or not LEAST_ROWS <= ranking <= 65_536):
-        raise InputError(f"--ranking {ranking}: must be 0 or a power of 2 from {LEAST_ROWS} to 65536")
+        require_between("--flights", flights, 1, MOST_FLIGHTS)
+    if ranking and (ranking & (ranking - 1) or not LEAST_ROWS <= ranking <= MOST_ROWS):
+        raise InputError(f"--ranking {ranking}: must be 0 or a power of 2 from {LEAST_ROWS} to {MOST_ROWS}")
     require_between("--records", records, 0, FLIGHTS_TOLD)
     require_engine(engine)
     asked = load_requirement(requirement)
     if plan_only:
         _say_plan(asked, as_json)
         return
+    signer = None if sign is None else private_key(sign)
     plan = plan_of(asked, flights, vehicle)
     folder = out or Path("out") / f"{asked.name}_certificate"
-    facts = _fly(asked, plan, engine_named(engine), requirement, folder, ranking, records)
+    how = How(engine_named(engine), ranking, records, again, signer)
+    facts = _fly(asked, plan, how, requirement, folder)
     answer(facts, as_json, lambda: show(facts))
     if facts["verdict"] != "pass":
         worst = [one for one in facts["requirement"]["requirements"] if one["verdict"] != "pass"]
         raise VerdictError(f"{asked.name}: " + "; ".join(f"{one['verdict']}: {one['sentence']}" for one in worst))
 
 
-def _fly(
-    asked: Requirement, plan: Plan, engine: Engine, name: str, folder: Path, ranking: int, records: int
-) -> dict[str, Any]:  # fmt: skip
-    """Fly what the folder lacks, rank, write."""
+class How(NamedTuple):
+    """What flies; rows of the ranking; records; flights that are flown again; the key that signs."""
+
+    engine: Engine
+    ranking: int
+    records: int
+    again: int
+    signer: Any
+
+
+def _fly(asked: Requirement, plan: Plan, how: How, name: str, folder: Path) -> dict[str, Any]:
+    """Fly what the folder lacks, and some of it again, rank, write, sign."""
     from flownav.campaigns.certification.cells import require_planned
-    from flownav.campaigns.certification.certify import certify, with_ranking
-    from flownav.campaigns.certification.written import write_certificate
+    from flownav.campaigns.certification.certify import certify, checked, with_ranking
+    from flownav.campaigns.certification.signing import SIGNATURE, sign
+    from flownav.campaigns.certification.written import FACTS, write_certificate
+    from flownav.campaigns.engines import Local
     from flownav.campaigns.ranking import flights_of
-    from flownav.campaigns.store import Store
+    from flownav.campaigns.store import Dataset, Store
     from flownav.cli.campaign_said import watching
 
     inputs = max(len(cell.setup.ensemble().entries) for cell in plan.cells)
     require_planned(plan, folder)
     with Store(folder).opened(plan) as store:
         with watching(plan) as watch:
-            certificate = certify(asked, plan, engine, store, watch)
-        if ranking:
-            with progress(f"Ranking {inputs} inputs", flights_of(inputs, ranking)) as advance:
-                certificate = with_ranking(certificate, engine, store, ranking, advance)
-        with progress("Writing the worst flights", records) as advance:
-            return write_certificate(certificate, store, name, records, advance)
+            certificate = certify(asked, plan, how.engine, store, watch)
+        with progress("Flying some again", how.again) as advance:
+            certificate = checked(certificate, Dataset(folder), Local(), how.again, advance)
+        if how.ranking:
+            with progress(f"Ranking {inputs} inputs", flights_of(inputs, how.ranking)) as advance:
+                certificate = with_ranking(certificate, how.engine, store.folder, how.ranking, advance)
+        with progress("Writing the worst flights", how.records) as advance:
+            facts = write_certificate(certificate, store, name, how.records, advance)
+        if how.signer is not None:
+            sign(folder / FACTS, how.signer)
+        else:
+            (folder / SIGNATURE).unlink(missing_ok=True)
+        return facts
+
+
+def _verify(folder: Path, requirement: str | None, again: int, key: Path | None, as_json: bool) -> None:
+    """Look a certificate's folder through, and say what holds. VerdictError where something does not."""
+    from flownav.campaigns.certification.verify import verify
+    from flownav.campaigns.engines import Local
+
+    with progress("Flying some again", again) as advance:
+        found = verify(folder, Local(), requirement=requirement, sample=again, key=key, on_progress=advance)
+    facts = found.as_json()
+    said = f"{facts['verification'].upper()}  {facts['requirement']}, certified as: {facts['verdict']}"
+    answer(facts, as_json, lambda: say(said, table_of(CHECKED, facts["checks"], left=3), wide=WIDE))
+    if not found.holds:
+        wrong = [f"{check.what}: {check.said}" for check in found.checks if check.found == "does not hold"]
+        raise VerdictError(f"{folder}: {'; '.join(wrong)}")
 
 
 def _say_plan(asked: Requirement, as_json: bool) -> None:
@@ -136,6 +197,9 @@ def show(facts: dict[str, Any]) -> None:
     elif facts["ranking"]:
         lines += [f"rank      {_index(row, 'input')}" for row in facts["ranking"][:INPUTS_RANKED]]
         lines += [f"known     {_index(row, 'known')}" for row in facts["split"]]
+    again = facts["flown_again"]
+    lines.append(f"again     {again['sample']} flights drawn at random and {again['margin']} at the margin, the same")
+    lines += [f"chosen    {name} {value}" for name, value in facts["chosen"].items() if value is not None]
     say(*lines, f"page      {facts['out']}", wide=WIDE, soft=True)
 
 

@@ -211,6 +211,7 @@ def _facts(tuned: Tuned) -> dict[str, Any]:
         "gain_nats": None if judgement.total is None else judgement.total._asdict(),
         "error_gain_nats": None if judgement.error is None else judgement.error._asdict(),
         "logs": [_log_facts(log) for log in tuned.logs],
+        "left_out": [{"log": name, "why": why} for name, why in tuned.left_out],
         "runs": tuned.runs,
     }
 
@@ -238,6 +239,12 @@ def _show_tuned(tuned: Tuned, facts: dict[str, Any]) -> None:
     if tuned.proposed:
         say(table_of(PROPOSED, facts["settings"], title="Proposed"))
     say(table_of(OF_LOGS, facts["logs"], title="Median error in the held-out windows"))
+    worse = [log.name for log in tuned.logs if tuned.proposed and (log.error or 0.0) > (log.start_error or 0.0)]
+    if worse:
+        why = "the verdict is by the mean over all windows, in which the large errors count most"
+        say(f"The median window errs more with the proposal in {', '.join(worse)}; {why}", soft=True)
+    for name, why in tuned.left_out:
+        say(f"Left out: {name}: {why}", soft=True)
     judgement = tuned.judgement
     figures = f": {gain_words(judgement.error)}" if judgement.error is not None else ""
     say(f"{judgement.verdict.capitalize()}: {judgement.why}{figures}", soft=True)

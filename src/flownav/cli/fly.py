@@ -10,6 +10,7 @@ from flownav.cli import options
 from flownav.cli.options import chosen, option, out_option, switch
 from flownav.cli.output import answer, figure, progress, record_place, require_between, save, say, table
 from flownav.core.errors import InputError, VerdictError
+from flownav.core.text import interval_words
 
 if TYPE_CHECKING:
     from flownav.api.flying import Flights
@@ -118,7 +119,8 @@ UNITS = {"x": "m", "y": "m", "z": "m", "u": "m/s", "v": "m/s", "w": "m/s"}
 def show(facts: dict[str, Any], paper: dict[str, Any] | None, median: int) -> None:
     """Errors per state beside the paper's table, largest position error, touchdown, files."""
     many = facts["flights"] > 1
-    white, digits, wide = facts["gps"] == "white", 3 if many else 4, WIDEST if many else WIDE
+    white, digits = facts["gps"] == "white", 3 if many else 4
+    wide = WIDEST if many else WIDE if paper else 0
     heads = ["state", *(f"{name} error" for name in STATISTICS)]
     if paper:
         whose = "paper's filter" if white else "paper's filter,\nwhite GPS noise"
@@ -130,12 +132,15 @@ def show(facts: dict[str, Any], paper: dict[str, Any] | None, median: int) -> No
         cells = [_cell(entry[f"{name}_error"], digits) for name in STATISTICS]
         cells += [f"{paper['states'][state][f'{name}_error']:.4f}" for name in PRINTED] if paper else []
         errors.add_row(f"{state} [{UNITS[state]}]", *cells)
+    for angle, entry in (facts["attitude_deg"] or {}).items():
+        cells = [_cell(entry[f"{name}_error"], digits) for name in STATISTICS]
+        errors.add_row(f"{angle} [deg]", *cells, *("" for _ in PRINTED if paper))
     beside = f"   paper: {paper['max_position_error_m']:.4f} m" if paper else ""
     beside += f" (for white GPS noise; {facts['gps']} is not white)" if paper and not white else ""
     largest = _cell(facts["max_position_error_m"], digits)
     say(errors, f"largest error of one position axis  {largest} m{beside}", wide=wide)
     if "known_exactly" in facts:
-        say("errors are those of what was flown on, in flight after the hand-over", wide=wide)
+        say("errors are those of the autopilot's input, in flight after the hand-over", wide=wide)
         say(f"known exactly  {facts['known_exactly']}", wide=wide)
     if facts.get("takeoff"):
         say(*takeoff_lines(facts["takeoff"], facts["flights"]), wide=wide)
@@ -186,8 +191,8 @@ def touchdown_lines(landing: dict[str, Any], landed: int | None, flights: int) -
         parts += [f"{words} {_cell(group[key], 3)} {unit}" for key, words, unit in MOTIONS if key in group]
         said.append(f"touchdown, {name}  {', '.join(parts)}")
         if group.get("r95_m") is not None:
-            low, high = (figure(end, ".3f") for end in group["r95_interval_m"])
-            said.append(f"touchdown R95, {name}  {group['r95_m']:.3f} m (95 % interval {low}..{high})")
+            ends = interval_words(*group["r95_interval_m"])
+            said.append(f"touchdown R95, {name}  {group['r95_m']:.3f} m (95 % interval {ends})")
     limited = landing["limited_by"]
     if limited is not None:
         which = "" if landed is None else "95 % of the flights within: "

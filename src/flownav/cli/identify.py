@@ -28,7 +28,7 @@ RESPONSES = (
     Column("axis", lambda r: r.axis),
     Column("height [m]", lambda r: f"{r.height_m:.2f}"),
     Column("gain", lambda r: _interval(r.gain, 1.0, 3)),
-    Column("latency [ms]", lambda r: _interval(r.latency_s, 1e3, 0)),
+    Column("latency [ms]", lambda r: _latency(r)),
     Column("order", lambda r: r.model.structure.label),
     Column("fit [%]", lambda r: f"{r.model.fit_percent:.1f}"),
     Column("unseen [%]", lambda r: _mean([value for value in r.validation_percent if value == value])),
@@ -62,6 +62,7 @@ def command(
 
     from flownav.api.identifying import identify_logs
     from flownav.lab.identification.autopilot_parameters import AUTOPILOTS as SUFFIXES
+    from flownav.lab.identification.autopilot_parameters import left_out
 
     suffix = None if autopilot is None else SUFFIXES[autopilot]
     path = place(_sensor_path(out, logs), *logs, base, force=force, beside=(suffix,) if suffix else ())
@@ -69,9 +70,10 @@ def command(
     heights_m = numbers("--heights", heights, 0.001, 1000.0) if heights else []
     sensor = identify_logs(logs, order, heights_m, reference, flow_instance=flow_instance, base=base)
     facts = sensor.facts | {"sensor": str(sensor.save(path))}
-    if parameter_path is not None and autopilot is not None:
-        facts |= {"parameters": str(parameter_path), "autopilot": sensor.save_parameters(parameter_path, autopilot)}
     findings = sensor.findings
+    if parameter_path is not None and autopilot is not None and findings is not None:
+        facts |= {"parameters": str(parameter_path), "autopilot": sensor.save_parameters(parameter_path, autopilot)}
+        facts |= {"left_out": dict(left_out(autopilot, findings))}
     if findings is not None:
         answer(facts, as_json, lambda: show(findings, facts))
 
@@ -100,8 +102,14 @@ def show(findings: Findings, facts: dict[str, Any]) -> None:
         f"power {_interval(noise.exponent, 1.0, 2)} from {noise.low_m:.2f} to {noise.high_m:.2f} m",
         table_of(SCHEDULES, findings.noise.schedules, title="Schedules of the variance (best first)"),
         *(f"Note: {note}" for note in findings.notes),
+        *(f"Not written: {name}; {why}" for name, why in facts.get("left_out", {}).items()),
     )
     say_files(facts, ("sensor", "parameters"))
+
+
+def _latency(response: Any) -> str:
+    """The latency; in words that it is none where the log's motion does not show it."""
+    return _interval(response.latency_s, 1e3, 0) if response.choice.excitation.identifiable > 1 else "not shown"
 
 
 def _mean(values: list[float]) -> str:

@@ -38,6 +38,7 @@ CARRIES = "What the link carries each way."
 BAUD = "a serial port's by its baud rate"
 SETUP = "Only read the vehicle's parameters, and say what must change for --send."
 WRITE = "With --setup: write what must change, never while armed."
+ORIGIN = "With --setup: where the EKF's frame begins, for a vehicle without GPS [deg, deg, m]."
 SOURCES = "With --setup: ArduPilot's source set for flownav."
 Url = Annotated[str, named("URL", URL, autocompletion=one_of(*options.LINKS)["autocompletion"])]
 Record = Annotated[Path | None, option("PATH", RECORD, "--out", "--record", unset="none is written")]
@@ -46,6 +47,7 @@ Component = Annotated[int | None, option("N", COMPONENT, unset="the autopilot's"
 Accept = Annotated[list[str] | None, option("MESSAGE=SYSTEM.COMPONENT", ACCEPT)]
 Duration = Annotated[float | None, option("S", DURATION, unset="at Ctrl-C", within=(0.1, 1e6))]
 Capacity = Annotated[float | None, option("BYTES/S", CARRIES, unset=BAUD, within=(500.0, 1e9))]
+Origin = Annotated[str | None, option("LAT,LON,ALT", ORIGIN, unset="none is set")]
 SourceSet = Annotated[int | None, option("1..3", SOURCES, unset="a free one", within=(1, 3))]
 
 
@@ -70,6 +72,7 @@ def command(
     setup: Annotated[bool, switch(SETUP, "--setup")] = False,
     write: Annotated[bool, switch(WRITE, "--write")] = False,
     source_set: SourceSet = None,
+    origin: Origin = None,
     as_json: options.Json = False,
 ) -> None:
     """Navigate a vehicle that is connected by MAVLink: fuse its sensors, send the estimate, show and record it."""
@@ -85,10 +88,11 @@ def command(
     if setup:
         key = load_key(signing_key) if signing_key else None
         return run_setup(
-            url, send, write=write, source_set=source_set, system=system, component=component, key=key, as_json=as_json
-        )
-    if write or source_set is not None:
-        raise InputError("--write and --source-set go with --setup only")
+            url, send, write=write, source_set=source_set, system=system, component=component, key=key, origin=origin,
+            as_json=as_json,
+        )  # fmt: skip
+    if write or source_set is not None or origin is not None:
+        raise InputError("--write, --source-set and --origin go with --setup only")
     if record is not None:
         require_recordable(record, sensor, signing_key, settings, force=force)
     told = replace(
@@ -139,9 +143,18 @@ def _navigate(
     if not display.stuck:
         _say(facts, as_json=as_json)
     if not heard:
-        raise VerdictError(f"{url}: no autopilot was heard in {facts['duration_s']:.1f} s; see that it sends there")
+        raise VerdictError(_nobody(url, facts))
     if finished is not None and finished.reason:
         raise VerdictError(finished.verdict())
+
+
+def _nobody(url: str, facts: dict[str, Any]) -> str:
+    """Why there was no vehicle to navigate."""
+    others = [f"{system}.{component}" for system, component in facts["other_autopilots"]]
+    if others:
+        heard = ", ".join(others)
+        return f"{url}: only autopilots that were not asked for were heard ({heard}); see --system, --component"
+    return f"{url}: no autopilot was heard in {facts['duration_s']:.1f} s; see that it sends there"
 
 
 @contextmanager
@@ -228,7 +241,7 @@ def _facts(session: Session, latency: Latency, duration_s: float) -> dict[str, A
                 "reason": spell.why,
                 "now": sensor in session.alarms,
             }
-            for sensor, spell in sorted(session.past_alarms.items())
+            for sensor, spell in sorted(session.offering.past_alarms.items())
         },
         "horizon_s": session.hearing.horizon_s,
         "lags_s": {sensor.name.lower(): lag_s for sensor, lag_s in sorted(session.hearing.lags.by_sensor.items())},

@@ -24,18 +24,20 @@ COLUMNS = (
 
 def run(
     url: str, send: str, *, write: bool, source_set: int | None, system: int | None, component: int | None,
-    key: bytes | None, as_json: bool,
+    key: bytes | None, origin: str | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Read, compare, write where asked to; print. Exit status 1 where something must change."""
     from flownav.live.byte_links import open_link
     from flownav.live.link import parse_url
+    from flownav.live.setup.arming import origin_of
     from flownav.live.setup.check import check
     from flownav.live.setup.talk import Talk
 
     link = open_link(url)
     try:
         talk = Talk(link, system=system, component=component, key=key)
-        report = check(talk, parse_url(url), send, writing=write, asked_set=source_set)
+        place = origin_of(origin) if origin is not None else None
+        report = check(talk, parse_url(url), send, writing=write, asked_set=source_set, origin=place)
     finally:
         link.close()
     answer(report.as_dict(), as_json, lambda: _show(report))
@@ -62,6 +64,11 @@ def _show(report: Report) -> None:
     for says in dict.fromkeys(block.says for block in report.blocks):
         having = ", ".join(f"{block.name} {block.has:g}" for block in report.blocks if block.says == says)
         lines.append(f"Blocks arming: '{says}' ({having})")
+    if report.ready.origin_deg_m is not None:
+        latitude, longitude, altitude_m = report.ready.origin_deg_m
+        lines.append(f"Origin of the EKF: {latitude:.7f}, {longitude:.7f}, {altitude_m:.1f} m")
+    lines += [f"Missing: {line}" for line in report.ready.missing]
+    lines += [f"The autopilot says: '{line}'" for line in report.ready.says]
     lines += report.notes
     if report.in_flight:
         lines += ["Switching sources in flight:", *(f"  {line}" for line in report.in_flight)]

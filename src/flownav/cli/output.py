@@ -16,8 +16,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import typer
 
 from flownav.core.errors import InputError
+from flownav.core.text import interval_words
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.table import Table
 
     from flownav.core.record import Record
@@ -147,14 +149,6 @@ def writing(path: Path, what: str = "") -> Iterator[None]:
         raise InputError(f"{path}: {what}cannot be written ({error.strerror}); give another --out") from error
 
 
-def write_text(path: Path, text: str, newline: str | None = "\n") -> None:
-    """Write a text, whole or not at all; what is no text in names of files is written as it is typed."""
-    from flownav.core.guard import written_whole
-
-    with written_whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline=newline)
-
-
 Row = Mapping[str, Any]
 
 
@@ -182,10 +176,11 @@ def figure(value: Any, form: str = ".2f", scale: float = 1.0) -> str:
 
 
 def with_ends(value: float | None, ends: Iterable[float | None], join: str = "-", form: str = ".3f") -> str:
-    """A figure with its interval in brackets; a dash where there is none, a question mark for an open end."""
+    """A figure with its interval in brackets; a dash where there is none, "from" where the upper end is open."""
     if value is None:
         return "-"
-    return f"{value:{form}} ({join.join('?' if end is None else f'{end:{form}}' for end in ends)})"
+    low, high = ends
+    return f"{value:{form}} ({interval_words(low, high, form, join)})"
 
 
 def table(
@@ -215,14 +210,63 @@ def plain_look(*, edge: bool = True) -> dict[str, Any]:
 
 
 def say(*things: Any, wide: int = 0, soft: bool = False) -> None:
-    """Print tables and lines, in so many columns at least. soft: long lines are not broken."""
+    """Print tables and lines. soft: long lines are not broken.
+
+    On a terminal tables fit its width; into a file or a pipe things have `wide` columns at least.
+    """
     from rich.console import Console
+    from rich.table import Table
 
     console = Console(markup=False, highlight=False)
-    if wide:
+    if wide and not console.is_terminal:
         console.width = max(console.width, wide)
     for thing in things:
-        console.print(thing, soft_wrap=soft)
+        for part in fitted(thing, console) if isinstance(thing, Table) and console.is_terminal else (thing,):
+            console.print(part, soft_wrap=soft)
+
+
+LEAST_WORDS = 20  # columns that a column of words is not made narrower than
+
+
+def fitted(made: Table, console: Console) -> Iterator[Table]:
+    """A table in the console's width: with broken heads and words, or else its columns in tables one under the other,
+    each of which begins with the first column.
+    """
+    from rich.measure import Measurement
+
+    def too_wide(chosen: list[int]) -> bool:
+        part = _with_columns(made, chosen)
+        return Measurement.get(console, console.options.update(max_width=10_000), part).minimum > console.width
+
+    chosen, title = [0], made.title
+    for k in range(1, len(made.columns)):
+        if len(chosen) > 1 and too_wide([*chosen, k]):
+            yield _with_columns(made, chosen, title)
+            chosen, title = [0], None
+        chosen.append(k)
+    yield _with_columns(made, chosen, title)
+
+
+def _with_columns(made: Table, chosen: list[int], title: Any = None) -> Table:
+    """Some columns of a table: heads are broken between words, figures never, words to LEAST_WORDS."""
+    from textwrap import wrap
+
+    names = ("box", "show_edge", "padding", "title_justify")
+    frame: dict[str, Any] = {name: getattr(made, name) for name in names}
+    part = type(made)(**frame, title=title)
+    for k in chosen:
+        column, cells = made.columns[k], [str(cell) for cell in made.columns[k].cells]
+        lines = [line for cell in cells for line in cell.splitlines()]
+        longest, word = (max(map(len, parts), default=0) for parts in (lines, " ".join(lines).split()))
+        broken = column.justify == "left" and longest > LEAST_WORDS and not column.no_wrap
+        head = wrap(str(column.header), max(longest, 1), break_long_words=False)
+        least = max(LEAST_WORDS, word) if broken else max(longest, *map(len, head), 1)
+        part.add_column(
+            "\n".join(head), justify=column.justify, style=column.style, min_width=least, no_wrap=not broken
+        )
+    for row in zip(*(made.columns[k].cells for k in chosen), strict=True):
+        part.add_row(*row)
+    return part
 
 
 def say_files(written: Mapping[str, Any], names: Iterable[str]) -> None:

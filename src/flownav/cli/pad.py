@@ -176,6 +176,7 @@ def _plain(facts: dict[str, Any]) -> dict[str, Any]:
 def _write_datasheet(
     out: Path, facts: dict[str, Any], target: PadTarget, camera_name: str, focus_m: float | None, mounting_deg: float
 ) -> str:
+    from flownav.core.guard import write_text
     from flownav.core.provenance import command_line
     from flownav.lab.optics.pad_datasheet import Assumed, datasheet
     from flownav.lab.optics.pad_trial import camera_named
@@ -186,7 +187,7 @@ def _write_datasheet(
     assumed = Assumed(float(sheet.rate_hz), float(sheet.latency_s), float(sheet.jitter_s), lens_m, mounting_deg)
     trial = camera_named(camera_name, focus_m)
     text = datasheet(facts["laws"], trial, camera_name, target, assumed, command_line())
-    output.write_text(out, text, newline=None)
+    write_text(text, out)
     PadCameraSheet.read(out)
     return str(out)
 

@@ -9,7 +9,7 @@ import typer
 
 from flownav.cli import options
 from flownav.cli.options import chosen, option, out_option
-from flownav.cli.output import answer, place, progress, require_between, say, table, write_text, writing
+from flownav.cli.output import answer, place, progress, require_between, say, table, writing
 from flownav.core.errors import InputError, VerdictError
 
 if TYPE_CHECKING:
@@ -77,7 +77,8 @@ def validate(
     as_json: options.Json = False,
 ) -> None:
     """Hold the simulator against recorded flights: outage drift, innovations, noise, as flown and as simulated."""
-    from flownav.core.guard import an_input
+    from flownav.core.guard import an_input, write_text
+    from flownav.core.marks import XML
     from flownav.studies.validation.drawn import load_flights
     from flownav.studies.validation.job import replays_of
     from flownav.studies.validation.job import validate as validated
@@ -91,7 +92,7 @@ def validate(
     with progress("Validating", replays_of(recorded, flights)) as advance:
         rows = validated(data, recorded, seed, flights, advance)
     if path is not None:
-        write_text(path, page(rows, seed, flights, recorded.vehicle.path_bandwidth_hz))
+        write_text(page(rows, seed, flights, recorded.vehicle.path_bandwidth_hz), path, XML)
     facts = {"seed": seed, "flights": flights, "rows": [row.as_json() for row in rows]}
     answer(facts | {"out": str(path) if path else None}, as_json, lambda: _show_validated(rows))
     kind = [row for row in rows if row.decides and row.verdict == "too kind"]

@@ -26,6 +26,7 @@ from flownav.core.text import number
 
 if TYPE_CHECKING:
     from flownav.core.record import Record
+    from flownav.logs.log import Log
     from flownav.replays.prepare import ReplayOptions
 
 
@@ -78,10 +79,27 @@ def command(
     read = open_flight(log, flow_instance=flow_instance, topics=asked_topics(topic or []))
     with progress("GPS outages", len(table)) if table else nullcontext() as advance:
         record = replay_log(read, asked_options, flow, stated, smooth=smooth, table=table, part=part, progress=advance)
+    if report and not read.fed:
+        record.manifest["explained"] = _explained(read)
     scores = record.scores | save(record, record_path, report=report)
     answer(scores, as_json, lambda: show(record, scores))
     if record.verdict:
         raise VerdictError(f"{log}: {record.verdict}")
+
+
+def _explained(log: Log) -> dict[str, Any]:
+    """Why the log drifted, for the record's page."""
+    from flownav.studies.explain.judge import explain
+    from flownav.studies.explain.page import HEADINGS, lines
+
+    found = explain(log)
+    causes = [{"cause": one.name, "sentence": one.sentence, "probability": one.probability} for one in found.findings]
+    return {
+        "verdict": found.verdict,
+        "causes": causes,
+        "headings": list(HEADINGS),
+        "lines": [list(line) for line in lines(found)],
+    }
 
 
 def _options(gps_delay_s: float, outages: list[str], flow_scale: str, *, no_flow: bool) -> ReplayOptions:
@@ -113,7 +131,7 @@ def show(record: Record, scores: dict[str, Any]) -> None:
     if scores["outages"]:
         say(table_of(OUTAGE_COLUMNS, scores["outages"], title="Horizontal error through GPS outages"))
     say(*error_lines(scores))
-    say(_sensors(scores))
+    say(*_sensors(scores))
     rejected = _rejected(scores)
     if rejected.row_count:
         say(rejected)
@@ -159,18 +177,22 @@ def autopilot_errors(scores: dict[str, Any]) -> str:
     )
 
 
-def _sensors(scores: dict[str, Any]) -> Any:
-    """When each sensor spoke, and whether the filter's innovations are as large as it states, and news."""
-    from flownav.scoring.consistency import verdict
+def _sensors(scores: dict[str, Any]) -> list[Any]:
+    """When each sensor gave readings, and whether its errors are as large as the filter states; what that means."""
+    from flownav.scoring.consistency import meanings, verdict
 
     rows = []
     for name in dict.fromkeys([*scores["coverage"], *scores["consistency"]]):
         span, judged = scores["coverage"].get(name), scores["consistency"].get(name)
-        said = (str(judged["samples"]), figure(judged["nis_per_dof"])) if judged else ("", "")
-        words = verdict(judged["nis_per_dof"], white=judged["white"]) if judged else ""
-        rows.append((name, f"{span['t0']:.1f}, {span['t1']:.1f}" if span else "", *said, words))
-    heads = ("sensor", "from, to [s]", "innovations", "NIS", "verdict")
-    return table(heads, rows, title="Sensors and their innovations")
+        tested = nis = words = ""
+        if judged:
+            mean = judged["nis_per_dof"]
+            tested, nis = str(judged["samples"]), "< 0.01" if mean < 0.005 else figure(mean)
+            words = verdict(mean, white=judged["white"])
+        rows.append((name, f"{span['t0']:.1f}, {span['t1']:.1f}" if span else "", tested, nis, words))
+    heads = ("sensor", "from, to [s]", "tested", "NIS", "its errors are")
+    return [table(heads, rows, title="Sensors, and their errors as the filter sees them"),
+            *(f"  {said}" for said in meanings(row[-1] for row in rows))]  # fmt: skip
 
 
 def _protection(found: dict[str, Any]) -> str:
@@ -242,14 +264,18 @@ def _print(facts: dict[str, Any]) -> None:
     def padded(text: str) -> Padding:
         return Padding(text, (0, 0, 0, 2))
 
-    say(f"{facts['log']}: {facts['end_s'] - facts['start_s']:.1f} s", f"Verdict: {facts['verdict']}")
+    say(f"{facts['log']}: {facts['end_s'] - facts['start_s']:.1f} s")
+    say(
+        f"Why it drifted: {facts['explained']}" if facts["causes"] else facts["explained"],
+        f"Verdict: {facts['verdict']}",
+    )
     say(*(f"Cannot be replayed: {obstacle}" for obstacle in facts["obstacles"]))
     say(table_of(STREAMS, facts["streams"], left=1, fixed=1, **plain_look(edge=False)))
     for s in facts["streams"]:
         if s["rejected"]:
             rejected = ", ".join(f"{count} {reason}" for reason, count in s["rejected"].items())
             say(f"Thrown away of {s['sensor']}: {rejected}")
-    say(*(f"Clock: {line}" for line in facts["clock"] or ["nothing found"]))
+    say(*(f"Clock: {line}" for line in facts["clock"] or ["no gap, no jump, nothing repeated"]))
     for name, limit in facts["limits"].items():
         said, share = f"Stated limits of {name}: {limit['low']:g} to {limit['high']:g}", limit["outside_share"]
         say(said if share is None else f"{said}; {100 * share:.1f} % of readings outside")

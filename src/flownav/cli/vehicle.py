@@ -24,13 +24,20 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-MARGINS = "Of the autopilot's loops, over the vehicle's uncertainty box."
+BESIDE = "a vehicle's FILE.toml, with --margins a RECORD.fnr"
+MARGINS = "Of the autopilot's loops, over the vehicle's uncertainty box; of RECORD.fnr, of what it learnt."
 
 
 def command(
     file: Annotated[
         str | None,
-        argument("VEHICLE", "The vehicle", *VEHICLES, beside="a vehicle's FILE.toml", default="maxi-joker-3"),
+        argument(
+            "VEHICLE",
+            "The vehicle",
+            *VEHICLES,
+            beside=BESIDE,
+            default="maxi-joker-3",
+        ),
     ] = None,
     margins: Annotated[bool, switch(MARGINS, "--margins")] = False,
     json_output: options.Json = False,
@@ -137,16 +144,19 @@ def show_margins(file: Path | None, *, as_json: bool) -> None:
 
     VerdictError where a loop keeps less than it must.
     """
+    from flownav.control.learnt_margins import CROSSED
     from flownav.control.margins import LEAST_GAIN_DB, LEAST_PHASE_DEG, margins_over_box, short_of_margin
     from flownav.vehicle.corners import groups_of
     from flownav.vehicle.kinds import read_vehicle
 
-    box = margins_over_box(file)
+    recorded = file is not None and file.suffix == ".fnr"
+    box = margins_of_flight(file) if file is not None and recorded else margins_over_box(file)
     rows = [{"loop": row.loop, "corner": row.corner, **row.margins.finite()} for row in box.rows]  # null: no edge
     count = len({row.corner for row in box.rows})
 
     def show() -> None:
-        say(margins_table(box), f"{count} corners; signs: {', '.join(groups_of(read_vehicle(file))[0])}")
+        crossed = CROSSED if recorded else groups_of(read_vehicle(file))[0]
+        say(margins_table(box), f"{count} corners; signs: {', '.join(crossed)}")
 
     answer({"margins": rows, "cannot_hover": list(box.cannot_hover)}, as_json, show)
     short = sorted({row.loop for row in box.rows if short_of_margin(row)})
@@ -155,6 +165,14 @@ def show_margins(file: Path | None, *, as_json: bool) -> None:
     if box.cannot_hover:
         corners = "; ".join(box.cannot_hover[:3])
         raise VerdictError(f"{len(box.cannot_hover)} corners of the box cannot hover: {corners}")
+
+
+def margins_of_flight(record: Path) -> Box:
+    """What the gains of a recorded flight keep, for the vehicle that it learnt. InputError where it learnt none."""
+    from flownav.api.record import load
+    from flownav.control.learnt_margins import margins_of_record
+
+    return margins_of_record(load(record).manifest, str(record))
 
 
 def margins_table(box: Box) -> Table:
@@ -180,11 +198,12 @@ def _margins(margins: Sequence[float]) -> Iterator[str]:
 
 def _short(corner: str) -> str:
     """`mass -, inertia +, ...` of the crossed groups as their signs alone; any other name as it is."""
+    from flownav.control.learnt_margins import CROSSED as LEARNT_CROSSED
     from flownav.control.margins import INFLOW_HELD
     from flownav.vehicle.corners import CROSSED, MULTIROTOR_CROSSED
 
     parts = corner.split(", ")
     held = [parts.pop()] if parts[-1] == INFLOW_HELD else []
-    if [part[:-2] for part in parts] in (list(CROSSED), list(MULTIROTOR_CROSSED)):
+    if tuple(part[:-2] for part in parts) in (tuple(CROSSED), tuple(MULTIROTOR_CROSSED), LEARNT_CROSSED):
         parts = [" ".join(part[-1] for part in parts)]
     return ", ".join([*parts, *held])

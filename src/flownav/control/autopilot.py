@@ -11,6 +11,7 @@ from typing import NamedTuple
 from flownav.control import guidance
 from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import Reference
+from flownav.control.heading import Facing, faced, heading_error
 from flownav.core.compile import clamp, equation, magnitude, replacing, smaller
 from flownav.core.frames import GRAVITY_M_S2, Rotation, heading_cosine_sine, to_earth
 
@@ -36,14 +37,22 @@ class AutopilotState(NamedTuple):
     away: float  # 1.0 while it goes around
     go_arounds: float
     since_s: float  # for how long it is in doubt, or, aloft, all is well
+    learns: float  # 1.0 while it learns its vehicle: a landing with a camera waits for it
+    heading_north: float  # of the heading that is held, and what turns it (heading.py)
+    heading_east: float
+    turn_rad_s: float
+    push_forward: float
+    push_right: float
 
 
+with_learning = replacing(AutopilotState, "learns")
 with_contact = replacing(AutopilotState, "flying", "contact_time_s")
 with_outer_loop = replacing(
     AutopilotState,
     "accel_forward", "accel_right", "gust_forward", "gust_right", "collective",
     "pitch_sine", "roll_sine", "collective_command", "waited_s", "searched_s", "away", "go_arounds", "since_s",
 )  # fmt: skip
+with_facing = replacing(AutopilotState, *Facing._fields)
 with_inner_loop = replacing(AutopilotState, "lon", "lat", "pedal")
 
 
@@ -66,7 +75,8 @@ def at_rest(gains: AutopilotGains, collective_command: float, flying: float) -> 
     """The state at rest: nothing integrated yet, the tilt of trimmed hover."""
     return AutopilotState(
         0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-        gains.pitch_trim_sine, gains.roll_trim_sine, collective_command, flying, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+        gains.pitch_trim_sine, gains.roll_trim_sine, collective_command, flying, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+        1.0, 0.0, 0.0, 0.0, 0.0,
     )  # fmt: skip
 
 
@@ -166,10 +176,14 @@ def steer(
         guidance.GoAround(state.away, state.go_arounds, state.since_s), known, now, gains, dt
     )
     away = around.away > 0.0
-    waiting = known.pad_found > 0.0 and guidance.misaligned(off_n, off_e, est_n, est_e, height_m, state.waited_s, gains)
-    gate_m = gains.search_height_m if looking else gains.align_height_m
-    gated_d = smaller(vel_d, guidance.descent_limit(waiting or looking, gate_m, height_m, reference.vel_d, gains))
+    known_place = known.pad_found > 0.0 or gains.search_height_m == 0.0
+    waiting = known_place and guidance.misaligned(off_n, off_e, est_n, est_e, height_m, state.waited_s, gains)
+    aloft = looking or guidance.learns_first(state.learns, known, height_m, gains)
+    gate_m = gains.search_height_m if aloft else gains.align_height_m
+    gated_d = smaller(vel_d, guidance.descent_limit(waiting or aloft, gate_m, height_m, reference.vel_d, gains))
     vel_d = guidance.climb_out(height_m, gains) if away else gated_d
+    vel_d = guidance.sunk(vel_d, known, state.contact_time_s, landing, gains) if not away else vel_d
+    vel_d = guidance.unpowered(height_m, known) if guidance.powerless(known) else smaller(vel_d, gains.sink_limit_m_s)
     waited_s = state.waited_s + dt if (waiting and landing) or away else state.waited_s
 
     error_forward, error_right = along_heading(rotation, vel_n - est_n, vel_e - est_e)
@@ -199,13 +213,18 @@ def outer_loop(
     heave = integrate(
         state.collective, error_down, -gains.collective_integral, dt, collective, gains.collective_limit_rad
     )
-    in_flight = gains.collective_trim_rad + clamp(collective, -gains.collective_limit_rad, gains.collective_limit_rad)
+    most = gains.collective_limit_rad + (guidance.FLARE_RAD if guidance.powerless(known) else 0.0)
+    in_flight = gains.collective_trim_rad + clamp(collective, -gains.collective_limit_rad, most)
     settling = state.collective_command - gains.spool_rate_rad_s * dt
     on_ground = settling if settling > gains.idle_collective_rad else gains.idle_collective_rad
+    facing = faced(
+        Facing(state.heading_north, state.heading_east, state.turn_rad_s, state.push_forward, state.push_right),
+        gust_forward, gust_right, flying and state.contact_time_s == 0.0, gains, dt,
+    )  # fmt: skip
     limit = gains.tilt_limit
     pitch = -clamp(accel_forward / GRAVITY_M_S2, -limit, limit) if flying else 0.0
     roll = clamp(accel_right / GRAVITY_M_S2, -limit, limit) if flying else 0.0
-    return with_outer_loop(
+    flown = with_outer_loop(
         state,
         accel_forward=forward if flying else 0.0,
         accel_right=right if flying else 0.0,
@@ -221,17 +240,25 @@ def outer_loop(
         go_arounds=around.times,
         since_s=around.since_s,
     )
+    return with_facing(
+        flown,
+        heading_north=facing.heading_north,
+        heading_east=facing.heading_east,
+        turn_rad_s=facing.turn_rad_s,
+        push_forward=facing.push_forward,
+        push_right=facing.push_right,
+    )
 
 
 @equation
 def inner_loop(
     state: AutopilotState, rotation: Rotation, p: float, q: float, r: float, gains: AutopilotGains, dt: float
 ) -> tuple[AutopilotState, float, float, float, float]:
-    """Tilt, rates and heading (held at north) to blade angles lon, lat, col, ped [rad] (250 Hz)."""
+    """Tilt, rates and heading to blade angles lon, lat, col, ped [rad] (250 Hz)."""
     error_pitch = state.pitch_sine + rotation[6]  # sin(pitch) = -R_31
     error_roll = state.roll_sine - rotation[7]  # sin(roll) cos(pitch) = R_32
-    _, sin_heading = heading_cosine_sine(rotation)
-    error_rate_yaw = -gains.heading_gain * sin_heading - r
+    off = heading_error(rotation, state.heading_north, state.heading_east)
+    error_rate_yaw = gains.heading_gain * off + state.turn_rad_s - r
     flying = state.flying > 0.0
 
     lon = gains.pitch_gain * error_pitch - gains.pitch_damping * q + state.lon

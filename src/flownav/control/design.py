@@ -14,9 +14,11 @@ where a cyclic gives it a rate.
 import math
 
 from flownav.control.gains import AutopilotGains
+from flownav.control.learnt_model import Told
 from flownav.control.loops import OUTER_S
+from flownav.vehicle import rotor
 from flownav.vehicle.feasibility import hover_induced_velocity, hover_pitch
-from flownav.vehicle.kinds import AnyTrim, AnyVehicle
+from flownav.vehicle.kinds import AnyTrim, AnyVehicle, disc_of
 from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters, full_thrust
 from flownav.vehicle.trim import MultirotorTrim, Trim
 
@@ -27,6 +29,8 @@ ROLL_RAD_S, ROLL_INTEGRAL_1_S, ROLL_LEAD_S = 6.42, 0.647, 0.0700
 # searched with its own loop alone, yaw chosen by hand, as its search found nothing that keeps the box (control.md)
 HEAVE_RAD_S, HEAVE_INTEGRAL_1_S, HEIGHT_1_S = 9.3, 1.57, 1.7
 YAW_RATE_RAD_S, YAW_RATE_INTEGRAL_1_S, HEADING_1_S = 12.0, 1.6, 1.5
+SINK_SHARE = 0.5  # of the induced velocity: a vortex ring begins there (simulation/ground.py)
+INTO_WIND_RAD_S = math.radians(10.0)  # chosen: slow beside the yaw loop, half way round in 18 s
 # position and velocity, with gusts felt by the accelerometer and without
 FELT = {
     "position_gain": 0.36, "forward_gain": 0.94, "forward_integral": 0.18, "right_gain": 1.40, "right_integral": 0.36,
@@ -73,10 +77,29 @@ def helicopter_gains(
         **_loop("roll", roll, ROLL_INTEGRAL_1_S, ROLL_LEAD_S),
         **_loop("yaw_rate", yaw, YAW_RATE_INTEGRAL_1_S),
         heading_gain=HEADING_1_S,
+        into_wind_rad_s=INTO_WIND_RAD_S if feels_gusts else 0.0,
+        sink_limit_m_s=SINK_SHARE * hover.induced_velocity_m_s,
         **_at_rest(vehicle, hover),
         idle_collective_rad=idle_collective_rad,
         pedal_per_collective=_pedal_per_collective(vehicle, hover),
     )
+
+
+SLOP_UNSURE = 0.3  # standard deviation of the dead band, a share: half of what the shipped sheet says
+
+
+def told_before(vehicle: VehicleParameters, hover: Trim, begins: int) -> Told:
+    """What is believed of a helicopter before it is learnt in hover; begins: the epoch of the stir, below 0: never."""
+    spring = vehicle.hub_stiffness_n_m_rad + vehicle.hub_above_cg_m * hover.thrust_n
+    inflow, tip = hover.induced_velocity_m_s, vehicle.main_tip_speed_m_s
+    back = vehicle.flap_response * rotor.blowback(
+        hover.collective_rad, 0.0, 0.0, inflow, vehicle.main_lift_solidity, tip
+    )  # fmt: skip
+    return Told(
+        spring / vehicle.inertia_yy_kg_m2, spring / vehicle.inertia_xx_kg_m2, vehicle.flap_rate_1_s,
+        vehicle.cyclic_frequency_rad_s, vehicle.cyclic_damping_ratio, vehicle.cyclic_dead_band_rad,
+        SLOP_UNSURE * vehicle.cyclic_dead_band_rad, vehicle.per_main_speed_s_rad, float(back / tip), begins,
+    )  # fmt: skip
 
 
 def _at_rest(vehicle: AnyVehicle, hover: AnyTrim) -> dict[str, float]:
@@ -142,6 +165,7 @@ def multirotor_gains(
         collective_limit_rad=CLIMB_LIMIT_SHARE,
         cyclic_limit_rad=TILT_LIMIT_SHARE,
         heading_gain=ROTORS_HEADING_1_S,
+        sink_limit_m_s=SINK_SHARE * disc_of(vehicle).induced_m_s,
         pedal_limit_rad=YAW_LIMIT_SHARE,
         **_at_rest(vehicle, hover),
         idle_collective_rad=vehicle.idle_share,

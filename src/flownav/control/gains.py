@@ -29,6 +29,7 @@ class AutopilotGains(NamedTuple):
     roll_damping: float = 0.012
     cyclic_limit_rad: float = 0.12
     heading_gain: float = 1.5  # [1/s]
+    into_wind_rad_s: float = 0.0  # how fast the nose goes into a wind that pushes; 0: north is held
     yaw_rate_gain: float = 0.05  # [rad/(rad/s)]
     yaw_rate_integral: float = 0.10  # [rad/rad]
     pedal_limit_rad: float = 0.20
@@ -40,6 +41,7 @@ class AutopilotGains(NamedTuple):
     roll_trim_sine: float = 0.0
     idle_collective_rad: float = 0.0
     pedal_per_collective: float = 0.0  # what holds the heading against the main rotor's torque, about trim
+    sink_limit_m_s: float = 1e9  # faster a rotor sinks into its own wake
     spool_rate_rad_s: float = 0.20  # how fast the collective goes down to idle after touchdown
     # the last metres of a precision landing: nothing of it where the limits are as here
     pad_pos_d_m: float = 0.0  # of the reference point when the skids touch

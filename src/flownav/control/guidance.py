@@ -114,7 +114,8 @@ class Knowledge(NamedTuple):
 
     pad_found: 1 where the pad has been seen or stood upon; ground_found: 1 where a range tells the height over the
     ground, which else is that of GPS, metres off; pad_unseen_s: since the camera last saw the pad; sigma_m: of the
-    position over the pad, along its worse horizontal axis; doubted: 1 where the navigator suspects a fault.
+    position over the pad, along its worse horizontal axis; doubted: 1 where the navigator suspects a fault;
+    powerless_s: for how long the speed controller has told that the motor gives nothing.
     """
 
     pad_found: float
@@ -122,6 +123,7 @@ class Knowledge(NamedTuple):
     pad_unseen_s: float
     sigma_m: float
     doubted: float
+    powerless_s: float = 0.0
 
 
 class GoAround(NamedTuple):
@@ -143,6 +145,13 @@ def seeks(known: Knowledge, away: float, height_m: float, gains: AutopilotGains)
     low = away > 0.0 or (known.ground_found > 0.0 and height_m < gains.search_height_m + SEARCH_MARGIN_M)
     blind = known.pad_found == 0.0 or (away > 0.0 and unseen(known, gains))
     return blind and gains.search_height_m > 0.0 and low
+
+
+@equation
+def learns_first(learns: float, known: Knowledge, height_m: float, gains: AutopilotGains) -> bool:
+    """A vehicle that is still learning itself waits at the height of the search, as one that looks for its pad."""
+    low = known.ground_found > 0.0 and height_m < gains.search_height_m + SEARCH_MARGIN_M
+    return learns > 0.0 and gains.search_height_m > 0.0 and low
 
 
 @equation
@@ -227,6 +236,39 @@ def climb_out(height_m: float, gains: AutopilotGains) -> float:
     return clamp(
         gains.height_gain * (height_m - gains.go_around_height_m), -gains.climb_limit_m_s, gains.climb_limit_m_s
     )
+
+
+FELT_S = 0.2  # chosen: so long the speed controller must tell it
+# chosen by the least sink at the touchdown from 3 and 10 m (control.md)
+GLIDE_M_S, FLARE_1_S, FLARE_RAD = 4.0, 1.3, 0.12
+
+
+@equation
+def powerless(known: Knowledge) -> bool:
+    """The motor gives nothing: what the rotor's turning still holds must do for the landing."""
+    return known.powerless_s > FELT_S
+
+
+@equation
+def unpowered(height_m: float, known: Knowledge) -> float:
+    """Velocity down [m/s] without power: fast, as the air then turns the rotor, and braked over a ground that a range
+    knows in proportion to the height that is left.
+    """
+    braked = FLARE_1_S * larger(height_m, 0.0)
+    return smaller(GLIDE_M_S, braked) if known.ground_found > 0.0 else GLIDE_M_S
+
+
+BLIND_M_S = 0.5  # chosen: what the range sensor's 3.5 m and the heave loop stop well above the ground
+
+
+@equation
+def sunk(vel_d: float, known: Knowledge, contact_time_s: float, landing: bool, gains: AutopilotGains) -> float:
+    """Velocity down [m/s] of a landing that knows no height: on down, whatever GPS says of it, until a range finds the
+    ground; and with weight on its skids, that a gate or a wrong height does not lift it again.
+    """
+    blind = landing and known.ground_found == 0.0 and gains.search_height_m > 0.0
+    down = larger(vel_d, BLIND_M_S) if blind else vel_d
+    return larger(down, smaller(gains.land_speed_m_s, gains.climb_limit_m_s)) if contact_time_s > 0.0 else down
 
 
 FORESEEN_S = 1.0  # how far ahead the last metre's gate looks: chosen, not measured; that it looks, test_autopilot holds

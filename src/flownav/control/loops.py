@@ -19,7 +19,6 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
 
 from flownav.control.gains import AutopilotGains
 from flownav.core.frames import GRAVITY_M_S2
@@ -30,6 +29,7 @@ INNER_S = 0.004
 OUTER_S = 0.02
 # from what the estimate says to when it says it: one period of the outer loop, for transport and computing
 ESTIMATE_DELAY_S = 0.02
+TAYLOR_TERMS = 16  # of a matrix of norm 1/2: what is left out is below 1e-19
 
 # where a loop is cut: its name, and the signal's
 CUTS = {
@@ -180,6 +180,18 @@ def spectral_radius(plant: LinearPlant, gains: AutopilotGains, timing: Timing = 
     return float(np.abs(np.linalg.eigvals(period_map(plant, gains, timing))).max())
 
 
+def exponential(matrix: Array) -> Array:
+    """e to a matrix (n, n), to rounding: Taylor's series of what is halved until it is small, squared again.
+
+    Moler and Van Loan, SIAM Review 45, 2003, method 3. SciPy's would cost every flight half a second to load.
+    """
+    halvings = max(0, int(np.ceil(np.log2(max(float(np.linalg.norm(matrix, 1)), 1e-300)))) + 1)
+    small, found = matrix / 2.0**halvings, np.eye(len(matrix))
+    for order in range(TAYLOR_TERMS, 0, -1):
+        found = np.eye(len(matrix)) + small @ found / order
+    return np.asarray(np.linalg.matrix_power(found, 2**halvings))
+
+
 def _outer_map(g: AutopilotGains, timing: Timing, factor: Mapping[str, float], rows: _Rows, periods: int) -> Array:
     """`autopilot.outer_loop` about hover: held commands, integrators and the estimate's delay line."""
     now = {name: rows.seen[name] for name in LATE[:6]}
@@ -229,7 +241,7 @@ def _inner_map(
         "ped": factor["ped"] * (g.yaw_rate_gain * yaw + of["ped_sum"] + g.pedal_per_collective * of["col"]),
     }
     n, m = plant.b.shape
-    step = expm(np.block([[plant.a, plant.b], [np.zeros((m, n + m))]]) * timing.inner_s)[:n]
+    step = exponential(np.block([[plant.a, plant.b], [np.zeros((m, n + m))]]) * timing.inner_s)[:n]
     found = np.eye(rows.count)
     found[:n] = step[:, n:] @ np.array([blades[name] for name in INPUTS])
     found[:n, :n] += step[:, :n]

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 # around an argument's name in a message; Unicode keeps them for a program's own use, so that no text of a user has them
 BEGIN, END = "\ufdd0", "\ufdd1"
+MOST_LETTERS = 2000  # of a message: chosen; the longest that says something, a list of all settings, has 1900
 ARGUMENT = re.compile(f"{BEGIN}(\\w+){END}")
 
 
@@ -20,7 +21,9 @@ class FlownavError(Exception):
     """
 
     def __init__(self, marked: object = "") -> None:
-        self.marked = str(marked)
+        text = str(marked)
+        middle = MOST_LETTERS // 2
+        self.marked = text if len(text) <= MOST_LETTERS else f"{text[:middle]} ... {text[-middle:]}"
         super().__init__(self.naming(str))
 
     def naming(self, called: Callable[[str], str]) -> str:

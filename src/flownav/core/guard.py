@@ -5,17 +5,17 @@ Readers pass every path through `an_input` before they open it. What a user name
 read is remembered, so that a file which another file names is held to be an input too.
 """
 
-import mmap
+import json
 import os
 import stat
-import zipfile
-import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from flownav.core import files
 from flownav.core.errors import InputError
+from flownav.core.marks import HASH, PAGE_MARK, is_ours, is_signed, manifest_of, marked
 
 KINDS = (
     (stat.S_ISFIFO, "a FIFO (a named pipe)"),
@@ -23,13 +23,8 @@ KINDS = (
     (stat.S_ISCHR, "a device"),
     (stat.S_ISBLK, "a device"),
 )
-MARK = b"flownav"  # stands near the start of all that flownav writes, but for the kinds below
-PAGE_MARK = '<meta name="generator" content="flownav">'  # of pages: notes on flownav speak of it, too
-LOOKED_AT_BYTES = 4096
+MOST_JSON_BYTES = 64 << 20  # of a file that we wrote ourselves
 LONGEST_SHOWN = 200  # characters of a name in a message
-RECORD_MAGIC, ULOG_MAGIC = b"PK\x03\x04", b"ULog"
-BEGINNINGS = (b"#timestamp [ns],p_RS_R_x [m],", b"| case ")  # of EuRoC files, and of the tables of `accuracy --out`
-LIVE = b'"kind": "live"'
 READ_IN_FOLDERS = {".csv", ".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm"}  # by those who take a folder
 RIG = "rig.toml"
 
@@ -93,6 +88,22 @@ def an_input(path: Path) -> Path:
     return path
 
 
+def object_in(path: Path, advice: str, most: int = MOST_JSON_BYTES) -> dict[str, Any]:
+    """The object that a JSON file holds. InputError, with advice, where it cannot be read or is none."""
+    try:
+        with an_input(path).open("rb") as file:
+            text = file.read(most + 1)
+        if len(text) > most:
+            raise ValueError(f"it has more than {most} bytes")
+        said = json.loads(text)
+    except (OSError, ValueError, RecursionError) as error:
+        reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:LONGEST_SHOWN]
+        raise InputError(f"{path}: cannot be read ({reason}); {advice}") from error
+    if not isinstance(said, dict):
+        raise InputError(f"{path}: cannot be read (it holds no object); {advice}")
+    return said
+
+
 def inputs_there(paths: Iterable[Path], what: str) -> None:
     """InputError where a file or folder that is to be read is missing, or cannot be read; `what` says what is taken."""
     for path in paths:
@@ -106,7 +117,7 @@ def a_record_place(path: Path, inputs: Iterable[Path] = (), *, force: bool) -> P
     InputError as of `an_output`, but that what is there may be a live record; with force it must be a record.
     """
     info = _status_of_output(path, inputs)
-    if force and info is not None and info.st_size and _manifest_of(path) is None:
+    if force and info is not None and info.st_size and manifest_of(path) is None:
         raise InputError(f"{path}: is there already and is no record, so it is not replaced; give another name")
     return path
 
@@ -114,12 +125,12 @@ def a_record_place(path: Path, inputs: Iterable[Path] = (), *, force: bool) -> P
 def an_output(path: Path, inputs: Iterable[Path] = (), *, signed_by: Path | None = None) -> Path:
     """The path of a file to be written, which may be there already if flownav wrote it.
 
-    inputs: paths that are read in the same run, besides those remembered. signed_by: the file that says who wrote
-    this one, where it does not do so itself. InputError where the path is one of them or
+    inputs: paths that are read in the same run, besides those remembered. signed_by: the file that says by its SHA-256
+    that this one is flownav's, where it does not do so itself. InputError where the path is one of them or
     would become one, is a link, a folder, a FIFO, a socket or a device, or holds what flownav does not replace.
     """
     info = _status_of_output(path, inputs)
-    if info is not None and info.st_size and not _is_ours(signed_by or path):
+    if info is not None and info.st_size and not (is_signed(path, signed_by) if signed_by else is_ours(path)):
         raise InputError(
             f"{path}: is there already and was not written by flownav, or cannot be made again, so it is not replaced; "
             "give another name, or move it away"
@@ -152,9 +163,18 @@ def written_whole(path: Path, *, replacing: bool = False) -> Iterator[Path]:
 
 def write_page(page: str, path: Path) -> None:
     """Write an HTML page, whole or not at all, with the mark by which it is known as flownav's. As `written_whole`."""
-    marked = page if PAGE_MARK in page else page.replace("<head>", f"<head>{PAGE_MARK}", 1)
+    signed = page if PAGE_MARK in page else page.replace("<head>", f"<head>{PAGE_MARK}", 1)
     with written_whole(path) as temporary:
-        temporary.write_text(marked, encoding="utf-8", errors="backslashreplace", newline="\n")
+        temporary.write_text(signed, encoding="utf-8", errors="backslashreplace", newline="\n")
+
+
+def write_text(text: str, path: Path, comment: tuple[str, str] = HASH) -> None:
+    """Write a text, whole or not at all, with the line by which it is known as flownav's. As `written_whole`.
+
+    comment: how one begins and ends in that format.
+    """
+    with written_whole(path) as temporary:
+        temporary.write_bytes(marked(text, comment))
 
 
 @contextmanager
@@ -196,38 +216,6 @@ def _check_no_input(path: Path, info: os.stat_result | None, inputs: Iterable[Pa
         folder = None if known is None or not in_folders else known.folder_of(path)
         if folder is not None:
             raise InputError(f"{path}: lies in {folder}, which this run reads, as one of its files; give another name")
-
-
-def _is_ours(path: Path) -> bool:
-    """Whether flownav wrote a file and can write it again: nothing is lost that somebody made, or flew."""
-    try:
-        with path.open("rb") as file:
-            head = file.read(LOOKED_AT_BYTES)
-            if head.startswith(ULOG_MAGIC):
-                with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
-                    return content.find(MARK + b"_") >= 0
-        if head.startswith(RECORD_MAGIC):
-            return _is_record_of_a_run(path)
-    except OSError:
-        return False
-    if b"<html" in head.lower():
-        return PAGE_MARK.encode() in head
-    return MARK in head or head.startswith(BEGINNINGS)
-
-
-def _is_record_of_a_run(path: Path) -> bool:
-    """A record that the same command makes again: not that of a live session, which no command can."""
-    manifest = _manifest_of(path)
-    return manifest is not None and LIVE not in manifest
-
-
-def _manifest_of(path: Path) -> bytes | None:
-    """The beginning of a record's manifest; None where a file is no record."""
-    try:
-        with zipfile.ZipFile(path) as bundle, bundle.open("manifest.json") as manifest:
-            return manifest.read(LOOKED_AT_BYTES)
-    except (OSError, zipfile.BadZipFile, zlib.error, KeyError, ValueError, NotImplementedError, RuntimeError, EOFError):
-        return None
 
 
 def _special(info: os.stat_result) -> str:

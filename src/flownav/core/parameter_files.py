@@ -12,9 +12,11 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError, ValidationInfo
+from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo
+from pydantic_core import core_schema
 
 from flownav.core.errors import InputError
+from flownav.core.text import meant
 
 PROVENANCE_KEYS = {"value", "uncertainty", "source"}
 MOST_BYTES = 4_000_000  # of a file: the largest that ships has 30 000
@@ -38,13 +40,21 @@ def _number(entry: Any) -> Any:
     return entry
 
 
-Number = Annotated[float, BeforeValidator(_value_of)]
+class _Given:
+    """A number with or without its provenance: a BeforeValidator that pydantic need not look into at every field."""
+
+    @staticmethod
+    def __get_pydantic_core_schema__(source: Any, handler: Callable[[Any], Any]) -> Any:
+        return core_schema.no_info_before_validator_function(_value_of, handler(source))
+
+
+Number = Annotated[float, _Given()]
 
 
 class ParameterModel(BaseModel):
     """Base of every file schema: unknown keys, NaN and infinity are refused; loaded values are frozen."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 def more_than(key: str) -> Callable[[float, ValidationInfo], float]:
@@ -153,14 +163,14 @@ def _sentence(error: Any, schema: type[BaseModel]) -> str:
     """What is wrong with one key and what would be right."""
     kind, given = error["type"], error["input"]
     if kind == "extra_forbidden":
-        known = ", ".join(sorted(_keys_beside(error["loc"], schema)))
-        return f"unknown key; known here: {known}"
+        known = sorted(_keys_beside(error["loc"], schema))
+        return f"unknown key; known here: {', '.join(known)}{meant(str(error['loc'][-1]), known)}"
     if kind == "missing":
         return "missing; add it"
-    return f"{_one_line(error['msg'].removeprefix('Value error, '))}, got {_shown(_number_of(given))}"
+    return f"{_one_line(error['msg'].removeprefix('Value error, '))}, got {as_shown(_number_of(given))}"
 
 
-def _shown(given: Any) -> str:
+def as_shown(given: Any) -> str:
     """A value as a message shows it: on one line, not endless."""
     try:
         return _one_line(repr(given))

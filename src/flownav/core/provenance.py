@@ -16,7 +16,7 @@ from typing import Any
 from flownav.core.files import natural_order
 from flownav.core.version import __version__
 
-LIBRARIES = ("numpy", "numba", "scipy", "pyarrow", "plotly")
+LIBRARIES = ("numpy", "numba", "scipy", "pyarrow")
 _call: ContextVar[str | None] = ContextVar("call", default=None)
 
 

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 SCHEMA_VERSION = 1
+LONGEST_S = 172_800.0  # from the first row of a record, or of a log, to its last: two days
+LATEST_S = 1e10  # of an instant: a clock of UNIX seconds shows 2e9, and its double tells microseconds apart
 
 POSITION_NED = ("pos_n_m", "pos_e_m", "pos_d_m")
 VELOCITY_BODY = ("vel_u_m_s", "vel_v_m_s", "vel_w_m_s")
@@ -66,6 +68,9 @@ TABLES: dict[str, tuple[str, ...]] = {
     "flown": STATE,
     # what the vehicle was told: references and controls
     "command": ("pos_n_ref_m", "pos_e_ref_m", "pos_d_ref_m", "lon_rad", "lat_rad", "col_rad", "ped_rad"),
+    # what a log says that its autopilot asked for, position in the frame of "autopilot", and its battery
+    "setpoint": (*POSITION_NED, *QUATERNION),
+    "battery": ("voltage_v", "current_a", "remaining_percent"),
     # one row per measurement component offered to the filter (PX4's estimator_aid_src fields)
     "innovation": (
         "sensor", "component", "observation", "observation_variance", "innovation", "innovation_variance", "test_ratio",
@@ -83,6 +88,9 @@ TABLES: dict[str, tuple[str, ...]] = {
     "reference_heading": ("yaw_rad",),
     # measurement streams are tables "gps_position", "flow_velocity", ...: measurement.COLUMNS and "quality"
 }  # fmt: skip
+
+# tables whose rows follow each other in time; readings, and what a log says beside them, stand as they came
+IN_ORDER = ("estimate", "consistency", "states", "smoothed", "flown", "command")
 
 Column = NDArray[Any]
 Table = dict[str, Column]
@@ -133,4 +141,4 @@ class Record:
         """Read a record. InputError where the file is missing, is no record, or is of a newer schema."""
         from flownav.core.record_file import load
 
-        return cls(*load(path, SCHEMA_VERSION, TABLES))
+        return cls(*load(path, SCHEMA_VERSION, TABLES, IN_ORDER, LATEST_S, LONGEST_S))

@@ -10,7 +10,7 @@ import json
 import re
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import IO, Any
 
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from flownav.core.arrow_columns import as_numpy, places, table_of
 from flownav.core.errors import InputError
 from flownav.core.guard import an_input, written_whole
 from flownav.core.measurement import COLUMNS, Sensor
@@ -81,24 +82,26 @@ def save(manifest: dict[str, Any], tables: Tables, path: Path, *, replacing: boo
     ):
         bundle.writestr(zipfile.ZipInfo(MANIFEST), json.dumps(manifest, indent=1, default=str))
         for name, table in tables.items():
-            columns, entry = pa.table(table), zipfile.ZipInfo(f"{name}.parquet")
+            columns, entry = table_of(table), zipfile.ZipInfo(f"{name}.parquet")
             with bundle.open(entry, "w", force_zip64=columns.nbytes >= zipfile.ZIP64_LIMIT) as stream:
-                pq.write_table(columns, pa.PythonFile(_Told(stream), "w"), compression="zstd")
+                words = [one.name for one in columns.schema if not pa.types.is_primitive(one.type)]  # each kept once
+                pq.write_table(columns, pa.PythonFile(_Told(stream), "w"), compression="zstd", use_dictionary=words)
             del columns
             pa.default_memory_pool().release_unused()
 
 
 def load_libraries() -> None:
-    """Load what `save` needs, with pandas, of which pyarrow asks at its first table."""
-    import pyarrow as pa
-    import pyarrow.parquet
-
-    pa.table({"t_s": np.zeros(1)})
+    """Load what `save` needs."""
+    import pyarrow.parquet  # noqa: F401
 
 
-def load(path: Path, newest: int, known: Mapping[str, tuple[str, ...]]) -> tuple[dict[str, Any], Tables]:
+def load(
+    path: Path, newest: int, known: Mapping[str, tuple[str, ...]], in_order: Collection[str], latest_s: float,
+    longest_s: float,
+) -> tuple[dict[str, Any], Tables]:  # fmt: skip
     """A record's manifest and tables. newest: the schema that is understood. known: columns by table.
 
+    in_order: tables whose rows follow each other in time. latest_s, longest_s: what an instant is, and a record spans.
     InputError where the file is missing, no record, of a newer schema, or would become too large.
     """
     if not an_input(path).is_file():
@@ -109,7 +112,12 @@ def load(path: Path, newest: int, known: Mapping[str, tuple[str, ...]]) -> tuple
             names = _checked_members(bundle, path.stat().st_size)
             manifest = _manifest(bundle.read(MANIFEST), path, newest)
             _check_tables(bundle, names, path.stat().st_size, known)
-            return manifest, {Path(name).stem: _table(bundle.read(name)) for name in names}
+            tables, left = {}, _allowed(path.stat().st_size)
+            for name in names:
+                tables[Path(name).stem], words = _table(bundle.read(name), left)
+                left -= words
+            _check_times(tables, in_order, latest_s, longest_s)
+            return manifest, tables
     except WRONG as error:
         what = " ".join(str(error).split())[:200] or type(error).__name__
         raise InputError(f"{path}: not a flownav record ({what}); write it again with fly or replay") from error
@@ -211,8 +219,11 @@ def _check_columns(table: str, schema: Any, known: Mapping[str, tuple[str, ...]]
     return texts
 
 
-def _table(data: bytes) -> dict[str, Column]:
-    """A table's columns; texts once each, however often they stand there."""
+def _table(data: bytes, most: int) -> tuple[dict[str, Column], int]:
+    """A table's columns, texts once each, however often they stand there; and how long all of them are together.
+
+    ValueError where that is more than `most`: whoever shows them writes each as often as it stands there.
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -222,21 +233,44 @@ def _table(data: bytes) -> dict[str, Column]:
     read = file.read() if file.metadata.num_rows else file.schema_arrow.empty_table()
     if read.num_rows != file.metadata.num_rows:
         raise ValueError(f"a table of {file.metadata.num_rows} rows has {read.num_rows}")
-    return {name: _column(name, column) for name, column in zip(read.column_names, read.columns, strict=True)}
+    length = sum(_length(read.column(name)) for name in texts)
+    if length > most:
+        raise ValueError(f"its texts are {length} characters")
+    return {name: _column(name, one) for name, one in zip(read.column_names, read.columns, strict=True)}, length
 
 
-def _column(name: str, column: Any) -> Column:
-    import pyarrow as pa
-
-    if not pa.types.is_dictionary(column.type):
-        if column.null_count and not pa.types.is_floating(column.type):
-            raise ValueError(f"column {name} has {column.null_count} cells without a number")
-        return np.asarray(column.to_numpy(zero_copy_only=False))
-    parts = [np.zeros(0, object)]
+def _length(column: Any) -> int:
+    """How many characters all cells of a column of text have."""
+    if not hasattr(column.type, "index_type"):
+        return 0  # of no row
+    found = 0
     for chunk in column.chunks:
-        words = np.array([*chunk.dictionary.to_pylist(), None], object)  # the last for what is not there
-        parts.append(words[chunk.indices.fill_null(len(words) - 1).to_numpy(zero_copy_only=False)])
-    return np.concatenate(parts)
+        each = np.array([len(word or "") for word in chunk.dictionary.to_pylist()] + [0], np.int64)
+        found += int(each[places(chunk)].sum())  # the last of those without
+    return found
+
+
+def _check_times(tables: Tables, in_order: Collection[str], latest_s: float, longest_s: float) -> None:
+    """ValueError where times are none that a flight can have: whoever lays a grid over them would fill the memory."""
+    ends = []
+    for name, table in tables.items():
+        t_s = table["t_s"].astype(float)
+        wrong = np.flatnonzero(~(np.abs(t_s) < latest_s))
+        if len(wrong):
+            raise ValueError(f"table {name}: row {wrong[0] + 1} has the time {t_s[wrong[0]]:g} s, which no clock shows")
+        back = np.flatnonzero(np.diff(t_s) < 0.0) if name in in_order else wrong
+        if len(back):
+            raise ValueError(f"table {name}: row {back[0] + 2} is earlier than the row before it")
+        ends += [float(t_s.min()), float(t_s.max())] if len(t_s) else []
+    if ends and max(ends) - min(ends) > longest_s:
+        raise ValueError(f"it covers {min(ends):g} to {max(ends):g} s, more than two days")
+
+
+def _column(name: str, found: Any) -> Column:
+    try:
+        return as_numpy(found)
+    except ValueError as error:
+        raise ValueError(f"column {name} has {error}") from None
 
 
 class _Told:

@@ -1,7 +1,8 @@
 """Numbers, names and nested dictionaries as text; the TOML is read back by `parameter_files`."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from decimal import Decimal
 from numbers import Integral
 from typing import Any
 
@@ -17,9 +18,26 @@ def number(text: str) -> float:
     return float(text)
 
 
+def meant(word: str, known: Iterable[str]) -> str:
+    """The one of the known words that a misspelt one is near, as a question to end a message with; "" far from all."""
+    from difflib import get_close_matches
+
+    names = {name.replace("-", "_"): name for name in known}
+    near = get_close_matches(word.replace("-", "_"), names, 1, 0.7)
+    return f"; did you mean {names[near[0]]}?" if near else ""
+
+
 def finite_or_none(value: float | None) -> float | None:
     """A number as JSON has it: None where there is none, where it is infinite and where it is no number."""
     return None if value is None or not math.isfinite(value) else float(value)
+
+
+def interval_words(low: float | None, high: float | None, form: str = ".3f", join: str = " to ") -> str:
+    """An interval's two ends; of one that too few flights leave open, the end that there is: "from 0.110"."""
+    if low is None or high is None:
+        ends = [f"{word} {end:{form}}" for word, end in (("from", low), ("to", high)) if end is not None]
+        return ends[0] if ends else "anything"
+    return f"{low:{form}}{join}{high:{form}}"
 
 
 def finite(value: Any) -> Any:
@@ -29,6 +47,12 @@ def finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [finite(item) for item in value]
     return finite_or_none(value) if isinstance(value, float) else value
+
+
+def exactly(value: float, times: int = 1) -> str:
+    """A finite number, or a multiple of it, in as many decimals as it takes to tell it from every other."""
+    said = Decimal(repr(float(value))) * times
+    return f"{said.normalize() if said else Decimal(0):f}"
 
 
 def plain(text: str) -> str:

@@ -8,6 +8,8 @@ noise is the joint update and inverts nothing. A lane that is not offered a read
 
 from typing import cast
 
+import numpy as np
+
 from flownav.core.compile import Lanes, Work, equation, procedure
 from flownav.estimation.states import (
     ACCEPTED,
@@ -32,9 +34,11 @@ from flownav.estimation.states import (
     STATES,
     STATES_WITH_LAG,
     TEST_RATIO,
+    WEIGHT,
     fold_attitude,
 )
 
+HUBER_SIGMAS = 2.0  # an innovation counts as no more (Huber, Robust Estimation of a Location Parameter, 1964): chosen
 LARGEST_VARIANCE = 1e30  # chosen: no reading is so poor, and its square is still finite
 
 
@@ -69,8 +73,12 @@ def columns_of(work: Work, lanes: Lanes, n: int) -> int:
 
 @equation
 def column(j: int) -> int:
-    """Row of element (0, j). The mask changes nothing; it shows the compiler that j (j + 1)/2 is never negative."""
-    return COVARIANCE + (j * (j + 1) // 2 & 2047)
+    """Row of element (0, j). The mask changes nothing; it shows the compiler that j (j + 1)/2 is never negative.
+
+    A fault's column has the states' rows alone: no fault is held against another.
+    """
+    whole = j if j < STATES_WITH_LAG else STATES_WITH_LAG
+    return COVARIANCE + (whole * (whole + 1) // 2 + (j - whole) * STATES_WITH_LAG & 2047)
 
 
 @equation
@@ -170,12 +178,17 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
     if fused_lanes == 0:
         return
     columns = columns_of(work, lanes, n)
+    for lane in range(len(lanes)):
+        sigmas = abs(work[INNOVATION * len(lanes) + lane]) / np.sqrt(work[INNOVATION_VARIANCE * len(lanes) + lane])
+        fused = work[ACCEPTED * len(lanes) + lane] > 0.0
+        strays = fused and sigmas > HUBER_SIGMAS and work[CONSIDERS * len(lanes)] > 0.0
+        work[WEIGHT * len(lanes) + lane] = HUBER_SIGMAS / sigmas if strays else 1.0
     for i in range(columns):
         for lane in range(len(lanes)):
             fused = work[ACCEPTED * len(lanes) + lane] > 0.0
             variance = work[INNOVATION_VARIANCE * len(lanes) + lane] if fused else 1.0
             cross = work[(CROSS + i) * len(lanes) + lane] if fused else 0.0
-            gain = cross / variance if i < n else 0.0
+            gain = work[WEIGHT * len(lanes) + lane] * cross / variance if i < n else 0.0
             work[(GAIN + i) * len(lanes) + lane] = gain
             work[(REST + i) * len(lanes) + lane] = cross - 0.5 * gain * variance
     for t in range(int(work[CONSIDERED * len(lanes)])):

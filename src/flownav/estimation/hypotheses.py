@@ -17,19 +17,19 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.compile import Lanes, Work, equation, larger, procedure
-from flownav.estimation.covariance import at
+from flownav.estimation.covariance import at, states_of
 from flownav.estimation.states import (
+    ACCEL_BIAS,
     ACCEPTED,
     CROSS,
+    GYRO_BIAS,
     HYPOTHESES,
     INFORMATION,
     INNOVATION,
     INNOVATION_VARIANCE,
-    MIDDLE,
     SCORE,
     SHARE,
     SIGNATURE,
-    VELOCITY,
 )
 
 # what each hypothesis is, and its unit
@@ -38,14 +38,17 @@ FLOW_AGE = 1  # flow older than said [s]
 RANGE_OFFSET = 2  # range too long [m]
 GPS_DRIFT = 3  # 3: GPS position drifts off north, east, down [m/s]
 HEADING_OFF = 6  # what is read as heading, too large [rad]
-FORCE = 7  # 2: specific force, forward and right [m/s2]
+FORCE = 7  # 3: specific force, forward, right and down [m/s2]
+TURNING = 10  # 2: body rate about the axes forward and right [rad/s]
 # faults that are there (1) or are not
-FLOW_SWAPPED = 9  # its channels
-FLOW_REVERSED = 10  # both
-COUNT = 11
+FLOW_SWAPPED = 12  # its channels
+FLOW_REVERSED = 13  # both
+COUNT = 14
+LEFT = COUNT  # what faults that are over have left: a column of its own, of size 1
 NAMES = (
     "flow scale", "flow age", "range offset", "GPS drift north", "GPS drift east", "GPS drift down", "heading off",
-    "accelerometer forward", "accelerometer right", "flow axes swapped", "flow reversed",
+    "accelerometer forward", "accelerometer right", "accelerometer down", "gyro forward", "gyro right",
+    "flow axes swapped", "flow reversed",
 )  # fmt: skip
 
 
@@ -66,7 +69,7 @@ def size_of(information: float, score: float, prior_sigma: float) -> Size:
 
 @equation
 def followed(work: Work, lanes: Lanes) -> int:
-    """How many faults are followed."""
+    """How many columns follow faults: COUNT and what they left, or 0."""
     return int(work[HYPOTHESES * len(lanes)])
 
 
@@ -85,14 +88,14 @@ def effect_of(work: Work, lanes: Lanes, n: int, fault: int, state: int, lane: in
 
 
 @procedure
-def push(work: Work, lanes: Lanes, n: int, dt_s: float) -> None:
-    """What a steady specific force along body x or y does to the velocity over a step: s_v <- s_v - dt R_EB e."""
+def hold_unlearnt(work: Work, lanes: Lanes, n: int) -> None:
+    """A fault of the IMU is a bias that the filter has not learnt, since it may have begun just now: s_bias <- 1."""
     if followed(work, lanes) > 0:
-        for axis in range(2):
-            for i in range(3):
-                for lane in range(len(lanes)):
-                    direction = work[(MIDDLE + 3 * i + axis) * len(lanes) + lane]
-                    work[at(VELOCITY + i, n + FORCE + axis) * len(lanes) + lane] -= dt_s * direction
+        for lane in range(len(lanes)):
+            for axis in range(3):
+                work[at(ACCEL_BIAS + axis, n + FORCE + axis) * len(lanes) + lane] = 1.0
+            for axis in range(2):
+                work[at(GYRO_BIAS + axis, n + TURNING + axis) * len(lanes) + lane] = 1.0
 
 
 @procedure
@@ -117,6 +120,20 @@ def fade(work: Work, lanes: Lanes, factor: float) -> None:
         for lane in range(len(lanes)):
             work[(INFORMATION + k) * len(lanes) + lane] *= factor
             work[(SCORE + k) * len(lanes) + lane] *= factor
+
+
+@procedure
+def leave_lane(work: Work, lanes: Lanes, n: int, fault: int, lane: int, size: float) -> None:
+    """What a fault of this size has done stays when it is over: s_left <- s_left + s b."""
+    for i in range(n):
+        work[at(i, n + LEFT) * len(lanes) + lane] += size * work[at(i, n + fault) * len(lanes) + lane]
+
+
+@equation
+def leave(work: Work, lanes: Lanes, state: int, lane: int, value: float) -> None:
+    """A state of a lane may be wrong by so much beside what faults left before."""
+    if followed(work, lanes) > 0:
+        work[at(state, states_of(lanes) + LEFT) * len(lanes) + lane] += value
 
 
 @procedure

@@ -130,10 +130,10 @@ class Signature(NamedTuple):
         read = [parameter.given(value) for parameter in self.reads]
         return f"law({', '.join([*read, *(f'{p.name}={p.given(str)}' for p in self.passed)])})"
 
-    def generated(self, name: str, lines: list[str]) -> Callable[..., Any]:
-        """The function of these lines, under the law's name, with the law beside it."""
+    def generated(self, name: str, lines: list[str], **called: Callable[..., Any]) -> Callable[..., Any]:
+        """The function of these lines, under the law's name, with the law beside it. called: what else they call."""
         scope = {p.record.__name__: p.record for p in (*self.reads, *self.passed) if p.record is not None}
-        found = write_function(name, "\n".join(lines) + "\n", {"law": compiled(self.function), **scope})
+        found = write_function(name, "\n".join(lines) + "\n", {"law": compiled(self.function), **scope, **called})
         return dressed(found, self.function, self._defaults())
 
     def _defaults(self) -> tuple[float, ...]:

@@ -19,7 +19,7 @@ from flownav.core.frames import (
 )
 from flownav.estimation.covariance import add_noise, at, columns_of
 from flownav.estimation.error_models import FilterSettings
-from flownav.estimation.hypotheses import push
+from flownav.estimation.hypotheses import hold_unlearnt
 from flownav.estimation.law import step
 from flownav.estimation.named import (
     AccelBias,
@@ -81,8 +81,8 @@ def predict(work: Work, lanes: Lanes, n: int, dt_s: float, settings: FilterSetti
     The walks of the biases and of everything else, and Gauss-Markov errors, are `error_models`' and no part of it.
     """
     strapdown(work, lanes, dt_s=dt_s)
+    hold_unlearnt(work, lanes, n)
     errors_in_motion(work, lanes, columns_of(work, lanes, n), dt_s=dt_s)
-    push(work, lanes, n, dt_s)
     add_motion_noise(work, lanes, dt_s, settings.position_walk_m_rt_s)
 
 

@@ -50,7 +50,7 @@ STATE_NAMES = (
 MOST_OBSERVED = 12  # states that one observation reads
 MOST_SOURCES = 15  # and one transition
 MOST_CONSIDERED = STATES  # states that a correction may leave as they are
-MOST_HYPOTHESES = 11  # faults whose effects on the state are followed (`hypotheses`)
+MOST_HYPOTHESES = 15  # faults whose effects on the state are followed, and what they left (`hypotheses`)
 COLUMNS = STATES_WITH_LAG + MOST_HYPOTHESES
 
 # STATE_NAMES without units, as laws name them
@@ -105,6 +105,7 @@ INNOVATION_VARIANCE = _rows.take(1)  # h P h' + R
 TEST_RATIO = _rows.take(1)  # innovation^2 / (gate^2 h P h' + R); above 1 is refused
 HELD_BACK = _rows.take(1)  # above 0 in lanes that test readings and fuse none
 ACCEPTED = _rows.take(1)  # 1 in lanes where it is to be fused, and then where it was
+WEIGHT = _rows.take(1)  # by how much its gain is less than that of a normal innovation
 COEFFICIENT = _rows.take(MOST_OBSERVED)  # h on the states that OBSERVED names
 OBSERVED = _rows.take(
     1 + MOST_OBSERVED
@@ -119,14 +120,15 @@ SHARE = _rows.take(MOST_HYPOTHESES)  # how much of the state's error the reading
 INFORMATION = _rows.take(MOST_HYPOTHESES)  # what innovations tell of its size [1 / its unit squared]
 SCORE = _rows.take(MOST_HYPOTHESES)  # that information times the size that they tell
 # within a step; beside the states stand the hypotheses
-CROSS = _rows.take(COLUMNS)  # P h'
-GAIN = _rows.take(COLUMNS)  # K
-REST = _rows.take(COLUMNS)  # P h' - K S/2
-SCRATCH = _rows.take(MOST_SOURCES * MOST_SOURCES)  # a transition's own block of P, both triangles
+SCRATCH = _rows.take(max(MOST_SOURCES * MOST_SOURCES, 3 * COLUMNS))  # a transition's own block of P, both triangles
+# and a correction's columns, in the same rows: none is done within the other
+CROSS = SCRATCH  # P h'
+GAIN = CROSS + COLUMNS  # K
+REST = GAIN + COLUMNS  # P h' - K S/2
 SLOPES = _rows.take(2 * len(SEEN_BY))  # derivatives of what a flow sensor with dynamics sees, forward and right
 # the packed upper triangle of P, column by column, and beside it a column for each hypothesis: last, so that a compiler
 # sees that no element is another row
-COVARIANCE = _rows.take(COLUMNS * (COLUMNS + 1) // 2)
+COVARIANCE = _rows.take(STATES_WITH_LAG * (STATES_WITH_LAG + 1) // 2 + MOST_HYPOTHESES * STATES_WITH_LAG)
 FILTER_ROWS = _rows.next
 
 # names of single rows, beside the states', that laws and steps may read or write

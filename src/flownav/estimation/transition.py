@@ -5,13 +5,16 @@ applied to each column of P and then, on the block of its own states, to each ro
 one pass and multiplies by no zero.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from functools import partial
 from itertools import combinations_with_replacement, pairwise
 from typing import Any, NamedTuple, Protocol, cast, get_type_hints
 
+from flownav.estimation.covariance import column
 from flownav.estimation.law import Signature, at, value_of
-from flownav.estimation.states import COVARIANCE, MOST_SOURCES, PLACES, SCRATCH, SHORT_NAMES
+from flownav.estimation.states import MOST_SOURCES, PLACES, SCRATCH, SHORT_NAMES
 
 
 class Transition(Protocol):
@@ -28,17 +31,27 @@ def transition(function: Callable[..., Any]) -> Transition:
 
     The law must be linear in the states that it reads, and it must read what it changes.
     """
-    takes = Signature.of(function)
-    sources = sorted(PLACES[name] for name in takes.names if name in PLACES)
-    targets = [PLACES[name] for name in get_type_hints(function)["return"]._fields]
-    if not set(targets) <= set(sources):
-        raise NameError(f"{function.__name__} changes states that it does not read")
-    if len(sources) > MOST_SOURCES:
-        raise ValueError(f"{function.__name__} reads more than {MOST_SOURCES} states")
-    plan = _Plan(takes, sources, targets)
-    lines = [f"def move({', '.join(['work', 'lanes', 'n', *takes.scalars])}):"]
-    lines += [*plan.columns_beside(), *plan.block_out(), *plan.block_moved(), *plan.block_back()]
-    return cast(Transition, takes.generated("move", lines))
+    plan = _Plan.of(function)
+    return _generated(plan, [*plan.columns_beside(), *plan.block_out(), *plan.block_moved(), *plan.block_back()])
+
+
+def block_ahead(function: Callable[..., Any]) -> Transition:
+    """The transition of a law's own states alone, left in SCRATCH: P stays as it is (`block_place` says where)."""
+    plan = _Plan.of(function)
+    return _generated(plan, [*plan.block_out(), *plan.block_moved()])
+
+
+def block_place(function: Callable[..., Any], state: int) -> tuple[int, int]:
+    """Where a state's column begins in the block of `block_ahead`, and which row of each column it is."""
+    sources = _Plan.of(function).sources
+    place = sources.index(state)
+    return SCRATCH + place * len(sources), place
+
+
+def _generated(plan: _Plan, lines: list[str]) -> Transition:
+    takes = plan.takes
+    head = f"def move({', '.join(['work', 'lanes', 'n', *takes.scalars])}):"
+    return cast(Transition, takes.generated("move", [head, *lines], column=column))
 
 
 class _Plan(NamedTuple):
@@ -51,6 +64,18 @@ class _Plan(NamedTuple):
     takes: Signature
     sources: list[int]
     targets: list[int]
+
+    @classmethod
+    def of(cls, function: Callable[..., Any]) -> _Plan:
+        """By the names of a law. NameError where it changes what it does not read; ValueError where it reads much."""
+        takes = Signature.of(function)
+        sources = sorted(PLACES[name] for name in takes.names if name in PLACES)
+        targets = [PLACES[name] for name in get_type_hints(function)["return"]._fields]
+        if not set(targets) <= set(sources):
+            raise NameError(f"{function.__name__} changes states that it does not read")
+        if len(sources) > MOST_SOURCES:
+            raise ValueError(f"{function.__name__} reads more than {MOST_SOURCES} states")
+        return cls(takes, sources, targets)
 
     def columns_beside(self) -> list[str]:
         """Columns of the states that the law does not read: what F makes of them stays where they are."""
@@ -130,15 +155,15 @@ def runs(order: list[int], targets: list[int]) -> list[list[int]]:
 
 
 def packed(i: str, j: str) -> str:
-    """Element (i, j) of P, i <= j, two variables; the mask is `covariance.column`'s."""
-    return at(f"{COVARIANCE} + ({j} * ({j} + 1) // 2 & 2047) + {i}")
+    """Element (i, j) of P, i <= j, two variables."""
+    return at(f"column({j}) + {i}")
 
 
 def beside(first: int, state: int) -> str:
     """Element (state, j) of P, for a j that runs from `first` on, on one side of the state."""
     if state < first:
-        return at(f"{COVARIANCE + state} + (j * (j + 1) // 2 & 2047)")
-    return at(f"{COVARIANCE + state * (state + 1) // 2} + j")
+        return at(f"column(j) + {state}")
+    return at(f"{column(state)} + j")
 
 
 def loops(j: str, i: str, line: str) -> list[str]:

@@ -18,6 +18,7 @@ import numpy as np
 
 from flownav.core.errors import InputError, arg
 from flownav.core.guard import written_whole
+from flownav.core.marks import marked_json
 from flownav.core.record import Column, Record, Table
 from flownav.core.version import __version__
 from flownav.export.trajectory import (
@@ -191,7 +192,7 @@ def write_foxglove(record: Record, path: Path) -> tuple[list[Path], list[str]]:
     written, notes = write_mcap(record, path)
     layout = layout_for(topics_of(path))
     with written_whole(layout_path(path)) as temporary:
-        temporary.write_text(json.dumps(layout, indent=1) + "\n", encoding="utf-8")
+        temporary.write_bytes(marked_json(layout))
     return [*written, layout_path(path)], notes
 
 

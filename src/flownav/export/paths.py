@@ -19,7 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flownav.core.errors import InputError, arg
-from flownav.core.guard import written_whole
+from flownav.core.guard import write_text, written_whole
+from flownav.core.marks import DECLARATION, XML, marked, marked_table
 from flownav.core.measurement import Array
 from flownav.core.record import POSITION_NED, Record
 from flownav.export.trajectory import Trajectory, stamps, trajectories
@@ -67,7 +68,7 @@ def euroc_text(path: Trajectory, frame: str) -> str:
     return "\n".join([",".join(names), *lines]) + "\n"
 
 
-TEXTS = {".tum": tum_text, ".csv": euroc_text}
+TEXTS = {".tum": (tum_text, marked), ".csv": (euroc_text, marked_table)}  # by suffix, and how each is marked
 
 
 def write_poses(record: Record, path: Path, frame: str) -> tuple[list[Path], list[str]]:
@@ -79,9 +80,8 @@ def write_poses(record: Record, path: Path, frame: str) -> tuple[list[Path], lis
     files = [path.with_name(f"{path.stem}_{one.name}{path.suffix}") for one in paths]
     with ExitStack() as stack:
         for one, file in zip(paths, files, strict=True):
-            stack.enter_context(written_whole(file)).write_text(
-                TEXTS[path.suffix](one, frame), encoding="utf-8", errors="backslashreplace"
-            )
+            text, mark = TEXTS[path.suffix]
+            stack.enter_context(written_whole(file)).write_bytes(mark(text(one, frame)))
     return files, [note for one in paths for note in one.notes]
 
 
@@ -153,8 +153,7 @@ def write_earth(record: Record, path: Path, to: str, origin: Origin | None) -> t
     stamp = _stamps(float(start_s) if isinstance(start_s, int | float) and dated else 0.0)
     tree = (_kml if to == "kml" else _gpx)(record, found, stamp)
     ElementTree.indent(tree)
-    with written_whole(path) as temporary:
-        ElementTree.ElementTree(tree).write(temporary, encoding="utf-8", xml_declaration=True)
+    write_text(DECLARATION + ElementTree.tostring(tree, encoding="unicode"), path, XML)
     return [path], notes
 
 

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.core.arrow_columns import table_of
 from flownav.core.errors import InputError
 from flownav.core.frames import quaternion_product, rotation_from_quaternion, to_earth
 from flownav.core.guard import folder_written_whole
@@ -133,15 +134,11 @@ Stamps = NDArray[np.int64]
 
 def write_parquet(record: Record, folder: Path) -> tuple[list[Path], list[str]]:
     """Write a folder of NAME.parquet and manifest.json, all or none; the files, and no notes."""
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
     def write(table: Table, file: Path) -> None:
-        columns = {
-            name: pa.array(texts(column), pa.string()) if is_text(column) else pa.array(column)
-            for name, column in table.items()
-        }
-        pq.write_table(pa.table(columns), file, compression="zstd")
+        columns = {name: np.array(texts(one), object) if is_text(one) else one for name, one in table.items()}
+        pq.write_table(table_of(columns), file, compression="zstd")
 
     return _write(record, folder, ".parquet", write)
 

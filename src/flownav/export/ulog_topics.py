@@ -8,7 +8,7 @@ PX4's own name where one fits, `flownav_...` else. Of PX4's topics those fields 
 
 import re
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -82,6 +82,13 @@ def information(name: str, text: str) -> bytes:
     return message("I", bytes([len(key)]) + key + value)
 
 
+def parameter(name: str, value: float) -> bytes:
+    """A setting of the vehicle as it was when the log began; a whole number is written as one."""
+    kind, code = ("int32_t", "<i") if float(value).is_integer() and abs(value) < 2**31 else ("float", "<f")
+    key = f"{kind} {name}".encode()
+    return message("P", bytes([len(key)]) + key + struct.pack(code, int(value) if code == "<i" else value))
+
+
 def definition(topic: Topic) -> bytes:
     """A topic's format message."""
     fields = ["uint64_t timestamp"]
@@ -116,8 +123,11 @@ def logged(time_us: int, text: str, level: str = "6") -> Stamped:
     )
 
 
-def assembled(topics: Sequence[Topic], strings: Sequence[Stamped], texts: dict[str, str]) -> bytes:
-    """A log of these topics, logged strings and texts about the whole of it, in order of time."""
+def assembled(
+    topics: Sequence[Topic], strings: Sequence[Stamped], texts: dict[str, str],
+    parameters: Mapping[str, float] | None = None,
+) -> bytes:  # fmt: skip
+    """A log of these topics, logged strings, and texts and parameters of the whole of it, in order of time."""
     rows = [row for number, topic in enumerate(topics) for row in data(topic, number)]
     rows = sorted([*rows, *strings], key=lambda row: row.time_us)
     return b"".join(
@@ -125,6 +135,7 @@ def assembled(topics: Sequence[Topic], strings: Sequence[Stamped], texts: dict[s
             header(rows[0].time_us),
             *(definition(topic) for topic in topics),
             *(information(name, text) for name, text in texts.items() if text),
+            *(parameter(name, value) for name, value in (parameters or {}).items()),
             *(subscription(topic.name, number) for number, topic in enumerate(topics)),
             *(row.body for row in rows),
         ]

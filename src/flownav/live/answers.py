@@ -6,21 +6,31 @@ from typing import Any
 import numpy as np
 
 from flownav.core.compile import ONE_LANE
-from flownav.core.frames import Vector, heading_from_quaternion, rotation_from_quaternion, to_body
+from flownav.core.frames import Vector, rotation_from_quaternion, to_body
 from flownav.core.measurement import Array
-from flownav.estimation.states import ATTITUDE, GYRO_BIAS, PAD, POSITION, STATE, VELOCITY
+from flownav.estimation.states import PAD, STATE
+from flownav.live.anchor import NOTHING, Base, holds
 from flownav.live.options import Limits, Options
 from flownav.live.reception import Vehicle
 from flownav.logs.mavlink import outgoing as say
 from flownav.logs.mavlink.framing import PX4, Message, coder
 from flownav.logs.mavlink.position_messages import LOCAL_FRD, LOCAL_NED
 from flownav.logs.mavlink.signing import sign_outgoing
-from flownav.navigation.ahead import covariance_at, state_at
 from flownav.navigation.loop import Running
-from flownav.navigation.memory import PAD_KNOWN, PROTECTION, SUSPECTED, load_aid, load_imu, load_start
+from flownav.navigation.memory import (
+    PAD_KNOWN,
+    PROTECTION,
+    SUSPECTED,
+    load_aid,
+    load_flow,
+    load_imu,
+    load_start,
+    load_suspicion,
+)
+from flownav.navigation.now import NowRow
 from flownav.navigation.place import SEEN
+from flownav.navigation.progress import LONGEST_AHEAD_S
 
-LONGEST_AHEAD_S = 2.0  # chosen: twice the longest horizon, within the inertial readings that are kept
 UNFUSED = "unfused"  # a reason that the session finds (horizon.Serving)
 INVALID_FLAG = 2.0  # the flag of `memory.AidMemory`
 WITHHELD = {
@@ -33,17 +43,27 @@ WITHHELD = {
     "unfused": "a horizontal sensor is heard and not fused",
     "fault_suspected": "innovations tell of a sensor that fails",
     "unprotected": "a sensor that fails unseen may have put the position too far off",
+    "origin_doubted": "the autopilot's origin is far from the fixes, and it does not say where it is in it",
     "not_finite": "the estimate is not a finite number",
-    "uncertain": "the estimate's standard deviation is too large",
+    "uncertain": "the position's standard deviation is too large",
+    "too_fast": "the velocity's standard deviation is too large",
+    "uncertain_down": "the height's standard deviation is too large",
+    "flow_doubted": "flow contradicts the inertial sensors, and nothing else holds the position",
+    "height_doubted": "the range and another height contradict the inertial sensors",
     "no_pad": "no pad has been seen",
     "nothing_asked": "--send none",
 }
 OWN_SYSTEM = 1  # until the vehicle's is known, which we then are of
+RELATIVE_S = 1.0  # of dead reckoning, what is stated is how far off it may go in so long
+RELATIVE_FLOOR_M = 0.05  # and what differs from one estimate to the next: chosen
 STEEPEST_COSINE = 0.1  # cosine of the steepest sight of the pad that is told, 84 deg: chosen, beyond any camera's view
 
 
-def why_withheld(on: Running | None, t_s: float, newest_s: float, limits: Limits) -> str:
-    """Why no estimate of `t_s` may be sent, "" where it may; newest_s: the vehicle's newest reading. See WITHHELD."""
+def why_withheld(on: Running | None, t_s: float, newest_s: float, limits: Limits, base: Base = NOTHING) -> str:
+    """Why no estimate of `t_s` may be sent, "" where it may; newest_s: the vehicle's newest reading. See WITHHELD.
+
+    base: what is known to be wrong with the place and is not counted any more.
+    """
     if on is None:
         return "listening"
     told, aid, imu = on.told, load_aid(on.work, ONE_LANE, 0), load_imu(on.work, ONE_LANE, 0)
@@ -56,85 +76,92 @@ def why_withheld(on: Running | None, t_s: float, newest_s: float, limits: Limits
         return "position_invalid"
     if t_s - aid.aided_s > limits.dead_reckoning_s:
         return "dead_reckoning"
-    if on.work[SUSPECTED] > 0.0:
+    if load_flow(on.work, ONE_LANE, 0).doubted > 0.0 and not holds(on):
+        return "flow_doubted"
+    if on.work[SUSPECTED] > 0.0 and load_suspicion(on.work, ONE_LANE, 0).suspected_s != base.suspected_s:
         return "fault_suspected"
-    return "" if on.work[PROTECTION] <= limits.protection_m else "unprotected"
+    return "" if on.work[PROTECTION] - base.protection_m <= limits.protection_m else "unprotected"
 
 
 def estimate_of(
     on: Running,
-    imu: Array,
+    now: NowRow[Array],
     t_s: float,
     boot_s: float,
     resets: int,
     offset_ned_m: Vector = (0.0, 0.0, 0.0),
     limits: Limits = Limits(),  # noqa: B008  (frozen)
+    base: Base = NOTHING,
 ) -> say.Estimate:
-    """The state carried on to t_s. imu (n, 7): readings later than the filter's clock. boot_s: t_s on their clock.
+    """The state of now, which is t_s; boot_s: that on their clock.
 
-    offset_ned_m: of the navigator's origin in the frame that is sent. limits: what `quality` is a share of.
+    offset_ned_m: of the navigator's origin in the frame that is sent. limits: what `quality` is a share of, less base.
     """
-    state = [float(value) for value in state_at(on.work, on.settings, imu, t_s)]
-    covariance = covariance_at(on.work, t_s, on.told.filter.position_walk_m_rt_s)
-    pose, velocity = _sent(covariance, heading_from_quaternion(*state[6:10]))
-    if not on.told.equipment.use_imu:
-        state[10:13] = [float("nan")] * 3
-    north_m, east_m, down_m = offset_ned_m
+    pose, velocity = _full(now.pose_covariance, 6), np.zeros((6, 6))
+    velocity[:3, :3], velocity[3:, 3:] = _full(now.vel_ned_covariance, 3), _full(now.rate_covariance, 3)
+    north_m, east_m, down_m = (float(a) + b for a, b in zip(now.pos_ned_m, offset_ned_m, strict=True))
     return say.Estimate(
         max(0, round(boot_s * 1e6)),
-        (state[0] + north_m, state[1] + east_m, state[2] + down_m),
-        (state[3], state[4], state[5]),
-        (state[6], state[7], state[8], state[9]),
-        (state[10], state[11], state[12]),
+        (north_m, east_m, down_m),
+        tuple(now.vel_ned_m_s.tolist()),
+        tuple(now.quaternion.tolist()),
+        tuple(now.rate_frd_rad_s.tolist()) if on.told.equipment.use_imu else (math.nan,) * 3,
         pose,
         velocity,
         resets,
-        quality_of(on, pose, velocity, t_s, limits),
+        quality_of(on, pose, velocity, t_s, limits, base),
     )
 
 
-def quality_of(on: Running, pose: Array, velocity: Array, t_s: float, limits: Limits) -> int:
+def _full(triangle: Array, count: int) -> Array:
+    """A symmetric matrix of its upper triangle, row by row."""
+    found = np.zeros((count, count))
+    found[np.triu_indices(count)] = triangle
+    return np.asarray(found + np.triu(found, 1).T)
+
+
+def quality_of(on: Running, pose: Array, velocity: Array, t_s: float, limits: Limits, base: Base = NOTHING) -> int:
     """1 to 100 percent: what is left to the nearest limit of position, velocity, protection and time without aid.
 
     ArduPilot takes neither the velocity's covariance nor a protection level; this it does take (VISO_QUAL_MIN).
     """
     used = (
-        math.sqrt(max(pose[0, 0], pose[1, 1], 0.0)) / limits.sigma_m,
+        math.sqrt(max(pose[0, 0] - base.variance_m2, pose[1, 1] - base.variance_m2, 0.0)) / limits.sigma_m,
         math.sqrt(max(velocity[0, 0], velocity[1, 1], 0.0)) / limits.sigma_m_s,
-        float(on.work[PROTECTION]) / limits.protection_m,
+        (float(on.work[PROTECTION]) - base.protection_m) / limits.protection_m,
         (t_s - load_aid(on.work, ONE_LANE, 0).aided_s) / limits.dead_reckoning_s,
     )
     worst = max(share if math.isfinite(share) else 1.0 for share in used)
     return max(1, min(100, round(100.0 * (1.0 - worst))))
 
 
-def fault_of(estimate: say.Estimate, limits: Limits) -> str:
-    """What is wrong with an estimate itself: `not_finite`, `uncertain`, or ""."""
+def fault_of(estimate: say.Estimate, limits: Limits, base: Base = NOTHING) -> str:
+    """What is wrong with an estimate itself: `not_finite`, `too_fast`, `uncertain_down`, `uncertain`, or ""."""
     assert estimate.pose_covariance is not None
     assert estimate.velocity_covariance is not None
     pose, velocity = np.diag(estimate.pose_covariance), np.diag(estimate.velocity_covariance)
     numbers = (*estimate.pos_ned_m, *estimate.vel_ned_m_s, *estimate.quaternion)
     if not (np.isfinite(numbers).all() and np.isfinite(pose).all() and np.isfinite(velocity).all()):
         return "not_finite"
-    if max(pose[0], pose[1]) > limits.sigma_m**2 or max(velocity[0], velocity[1]) > limits.sigma_m_s**2:
-        return "uncertain"
-    return ""
+    if velocity[:3].max() > limits.sigma_m_s**2:
+        return "too_fast"
+    if pose[2] > limits.sigma_down_m**2:
+        return "uncertain_down"
+    return "uncertain" if max(pose[0], pose[1]) - base.variance_m2 > limits.sigma_m**2 else ""
 
 
-def _sent(covariance: Array, heading_rad: float) -> tuple[Array, Array]:
-    """Covariances of the pose (north, east, down, roll, pitch, yaw) and of the velocity (NED, body rates).
+def as_relative(estimate: say.Estimate) -> say.Estimate:
+    """The accuracy of a place that dead reckoning tells: of where it is from where it was a second ago.
 
-    A small rotation of the level body about the earth's axes is one of roll and pitch turned by the heading.
+    What has been lost since the start is lost for the autopilot as well, which follows this place and has no other. If
+    the whole of it were stated, its filter would take the place for bad, follow the velocity, and drift by itself.
     """
-    turn = np.eye(6)
-    cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
-    turn[3:5, 3:5] = [[cosine, sine], [-sine, cosine]]
-    places = [*range(POSITION, POSITION + 3), *range(ATTITUDE, ATTITUDE + 3)]
-    pose = turn @ covariance[np.ix_(places, places)] @ turn.T
-    velocity = np.zeros((6, 6))
-    velocity[:3, :3] = covariance[VELOCITY : VELOCITY + 3, VELOCITY : VELOCITY + 3]
-    velocity[3:, 3:] = covariance[GYRO_BIAS : GYRO_BIAS + 3, GYRO_BIAS : GYRO_BIAS + 3]
-    return pose, velocity
+    assert estimate.pose_covariance is not None
+    assert estimate.velocity_covariance is not None
+    pose = estimate.pose_covariance.copy()
+    pose[:3, :3] = RELATIVE_S**2 * estimate.velocity_covariance[:3, :3] + RELATIVE_FLOOR_M**2 * np.eye(3)
+    pose[:3, 3:] = pose[3:, :3] = 0.0
+    return estimate._replace(pose_covariance=pose)
 
 
 class Answers:
@@ -167,6 +194,15 @@ class Answers:
         """PX4 and ArduPilot lay the stamps of what we send by this: they are of the vehicle's own clock."""
         return self._mav.timesync_encode(round(boot_s * 1e9), request.ts1)
 
+    def velocity(self, vehicle: Vehicle, estimate: say.Estimate) -> list[Message]:
+        """The velocity alone, where the place is not known; ArduPilot has a message for it."""
+        if self._options.send not in ("odometry", "vision"):
+            return []
+        if vehicle.make == PX4 and self._options.send == "odometry":
+            nowhere = estimate._replace(pos_ned_m=(math.nan,) * 3, pose_covariance=None)
+            return [say.odometry(self._mav, nowhere, frame=LOCAL_NED)]
+        return [say.vision_speed_estimate(self._mav, estimate)]
+
     def estimates(
         self, vehicle: Vehicle, estimate: say.Estimate, on: Running, offset_ned_m: Vector = (0.0, 0.0, 0.0)
     ) -> list[Message]:
@@ -175,6 +211,8 @@ class Answers:
         offset_ned_m: of the navigator's origin, which the pad's place is about, in the estimate's frame.
         """
         send = self._options.send
+        if not holds(on):
+            estimate = as_relative(estimate)
         if send == "odometry":
             return [say.odometry(self._mav, estimate, frame=LOCAL_NED if vehicle.make == PX4 else LOCAL_FRD)]
         if send == "vision":

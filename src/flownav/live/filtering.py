@@ -1,32 +1,34 @@
-"""The navigator behind the horizon: what it is fed, in batches of one queue, and what comes of it."""
+"""The navigator behind the horizon: the rings on which readings wait, what it is fed in batches, what comes of it."""
 
-from collections import deque
+import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from flownav.core.compile import ONE_LANE
-from flownav.core.frames import Vector
-from flownav.core.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sensor, Stream
+from flownav.core.frames import Vector, rotation_from_quaternion, to_earth
+from flownav.core.measurement import COLUMNS, Array, EventQueue, Measurement, Sensor, Stream
 from flownav.estimation.states import POSITION, STATE
-from flownav.live.horizon import Waiting
 from flownav.live.options import Options
-from flownav.logs.log import attitude_rates, mean_over
 from flownav.logs.mavlink.messages import TrueState
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.memory import load_start
-from flownav.navigation.rows import EventRow
-from flownav.navigation.spikes import Witness
+from flownav.navigation.now import NowRow
+from flownav.navigation.rings import Given, Rings, numbers_of
+from flownav.navigation.rows import EVENT_COLUMNS, INNOVATION_COLUMNS, EventRow
 from flownav.navigation.tables import written_on
 from flownav.navigation.tape import COMPONENTS, GPS_RESET, START, empty_tape
-from flownav.navigation.told import Equipment
-from flownav.sensors.datasheet import UNTURNED, in_vehicle_axes
+from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
+from flownav.navigation.waiting_records import Sizes
+from flownav.sensors.datasheet import UNTURNED, IdentifiedFlow, in_vehicle_axes
 
 NAN = float("nan")
 BATCH_READINGS = 64  # readings at a time, 6 ms of them; all at once, the first estimates stop the loop for 130 ms
-KEPT_IMU = 512  # two seconds at 250 Hz, more than the horizon and an exposure
-KEPT_ATTITUDES = 128  # more than two seconds at 50 Hz
+# chosen: ten seconds of a busy link, inertial readings and all others; a flood is dropped and counted
+# (test_live_safety). Attitudes: more than two seconds at 50 Hz
+ROOM = Sizes(ring=4096.0, table=4096.0, attitudes=128.0, most=8192.0)
 FLOW = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
 JUMPS = (int(START), int(GPS_RESET))  # events at which the estimate jumps
 
@@ -54,92 +56,79 @@ class Keeper:
 
 
 class Outcome(NamedTuple):
-    """What the last batch brought: rows of the tape's innovation and event."""
+    """What the last batch brought: how many readings it had, and rows of the tape's innovation and event."""
 
+    readings: int
     innovation: Array
     event: Array
 
 
+NOTHING = Outcome(0, np.zeros((0, INNOVATION_COLUMNS)), np.zeros((0, EVENT_COLUMNS)))
+
+
 class Filtering:
-    """One navigator from start to restart."""
+    """One navigator from start to restart, and what waits for it (`rings`)."""
 
     def __init__(self, options: Options, keeper: Keeper) -> None:
         self._options = options
         self._keeper = keeper
         self.running: Running | None = None
         self.jumps = 0
-        self._imu: deque[tuple[float, ...]] = deque(maxlen=KEPT_IMU)  # without spikes
-        self._witness, self._row_of_imu = Witness(), np.zeros((1, 7))
-        self._attitude: deque[tuple[float, ...]] = deque(maxlen=KEPT_ATTITUDES)
+        self.rings = Rings(ROOM, BATCH_READINGS)
         most = max(COMPONENTS.values())
         self._tape = empty_tape(BATCH_READINGS + 2, most * BATCH_READINGS, 8 * BATCH_READINGS + 8)
-        self._room = _empty_queue(BATCH_READINGS)
-        self._arrival_s = np.zeros(BATCH_READINGS)
 
-    def heard(self, waiting: Waiting) -> None:
-        """A reading has arrived: IMU and attitude are kept for the flow's exposure and for the way from then to now."""
-        reading = waiting.reading
-        if reading.sensor == Sensor.IMU and (not self._imu or waiting.t_s > self._imu[-1][0]):
-            self._row_of_imu[0, 0], self._row_of_imu[0, 1:] = waiting.t_s, reading.value
-            if self._witness.keeps(self._row_of_imu)[0]:
-                self._imu.append((waiting.t_s, *reading.value))
-        elif reading.sensor == Sensor.ATTITUDE and (not self._attitude or waiting.t_s > self._attitude[-1][0]):
-            self._attitude.append((waiting.t_s, *reading.value))
+    def begin(self, gps_heard: bool, origin_deg_m: tuple[float, float, float] | None = None) -> None:
+        """A navigator for the sensors that were listened to, whose readings wait. gps_heard: a receiver is there that
+        has had a fix.
 
-    def begin(
-        self, listened: list[Waiting], gps_heard: bool, origin_deg_m: tuple[float, float, float] | None = None
-    ) -> None:
-        """A navigator for the sensors that were listened to. gps_heard: a receiver is there, with a fix or without."""
+        Without one it waits for none. Its heading is then by the magnetometer all the same: a datum that the gyro alone
+        keeps would turn away from the autopilot's, about which what is sent is flown.
+        """
+        listened = self.rings.waiting()
         streams = _streams(listened)
         if gps_heard and Sensor.GPS_POSITION not in streams:
             streams[Sensor.GPS_POSITION] = Stream.of(Sensor.GPS_POSITION, np.zeros(0), np.zeros((0, 3)))
-        first_s = listened[0].t_s
+        first_s = float(listened.t_s[0])
         settings = self._options.settings
         equipment = equipment_of(streams, first_s, _own_gyro_is_dead(streams), settings, origin_deg_m)
         if gps_heard:
             equipment = equipment._replace(deadline_s=first_s + float(settings.start_wait_s))
+        elif equipment.heading == NO_HEADING and Sensor.MAG in streams:
+            equipment = equipment._replace(heading=FROM_MAG)
+            if origin_deg_m is None:
+                equipment = equipment._replace(declination_rad=own_declination_rad(streams))
         self.running = start_navigator(equipment, settings, self._tape, self._options.flow_noise)
         self._keeper.segment(equipment)
 
     def stop(self) -> None:
         """No navigator until the next `begin`."""
         self.running = None
-        self.jumps += 1
-        self._imu.clear()
-        self._witness = Witness()
-        self._attitude.clear()
 
-    def feed(self, released: list[Waiting]) -> Outcome:
-        """At most BATCH_READINGS readings, in the order of their instants."""
+    def feed(self, until_s: float) -> Outcome:
+        """Readings of instants up to until_s, at most BATCH_READINGS, in the order of their instants."""
         on = self.running
         assert on is not None
-        room = self._room
-        for row, waiting in enumerate(released):
-            room.t_s[row], room.sensor[row] = waiting.t_s, waiting.reading.sensor
-            room.value[row], room.variance[row] = self._row(waiting)
-            room.quality[row], self._arrival_s[row] = waiting.reading.quality, waiting.reading.t_s
-        count = len(released)
-        queue = EventQueue(
-            room.t_s[:count], room.sensor[:count], room.value[:count], room.variance[:count], room.quality[:count],
-            room.row[:count], room.withheld[:count], room.arrived[:count],
-        )  # fmt: skip
-        self._keeper.fed(queue, self._arrival_s[:count])
+        queue, arrival_s = self.rings.release(on.settings, until_s)
+        if not len(queue.t_s):
+            return NOTHING
+        self._keeper.fed(queue, arrival_s)
         on.tape.used[:] = 0
         run(queue, on)
         written = written_on(on.tape)
-        outcome = Outcome(written.innovation, written.event)
         self._keeper.written(*written)
-        self.jumps += sum(kind in JUMPS for kind in EventRow.of(outcome.event).kind.tolist())
-        return outcome
+        self.jumps += sum(kind in JUMPS for kind in EventRow.of(written.event).kind.tolist())
+        return Outcome(len(queue.t_s), written.innovation, written.event)
 
-    def imu_after(self, t_s: float) -> Array:
-        """IMU readings later than an instant, (n, 7)."""
-        later = []
-        for row in reversed(self._imu):
-            if row[0] <= t_s:
-                break
-            later.append(row)
-        return np.array(later[::-1]) if later else np.zeros((0, 7))
+    def now(self, t_s: float) -> NowRow[Array]:
+        """The state at an instant, carried on by the inertial readings that wait."""
+        assert self.running is not None
+        return self.rings.now(self.running.work, self.running.settings, t_s)
+
+    @property
+    def newest_imu_s(self) -> float:
+        """When the newest inertial reading was taken that is believed; NaN before the first."""
+        return self.rings.newest_inertial_s
 
     @property
     def clock_s(self) -> float:
@@ -160,78 +149,54 @@ class Filtering:
         """Whether a navigator runs that was told that no IMU serves."""
         return self.running is not None and not self.running.told.equipment.use_imu
 
+    @property
+    def lacks_gps(self) -> bool:
+        """Whether a navigator runs that was told of no receiver."""
+        return self.running is not None and not np.isfinite(self.running.told.equipment.deadline_s)
+
     def imu_rate_hz(self, t_s: float) -> float:
         """Rate of the IMU's readings in the two seconds before an instant."""
-        return 0.5 * sum(row[0] > t_s - 2.0 for row in self._imu)
-
-    # -- what a reading becomes -------------------------------------------------------------------------------
-    def _row(self, waiting: Waiting) -> tuple[list[float], list[float]]:
-        """Values and variances, MAX_VALUES each; flow in the vehicle's axes, with the turning over its exposure."""
-        reading, known = waiting.reading, self._options.identified
-        value = list(reading.value)
-        if reading.sensor in FLOW and known is not None and known.axes != UNTURNED:
-            angular = reading.sensor == Sensor.FLOW_RATE
-            value = in_vehicle_axes(np.array([value]), known, angular=angular)[0].tolist()
-        if reading.sensor == Sensor.FLOW_RATE:
-            value = self._with_turning(value, reading.t_s, waiting.exposure_s)
-        spare = MAX_VALUES - len(value)
-        return value + [np.nan] * spare, list(reading.variance) + [np.nan] * (MAX_VALUES - len(reading.variance))
-
-    def _with_turning(self, value: list[float], end_s: float, exposure_s: float) -> list[float]:
-        """The IMU's mean rates over the exposure beside the sensor's own gyro, or in its place where it has none."""
-        start = np.array([end_s - exposure_s])
-        end = np.array([end_s])
-        imu = self._since(self._imu, end_s - 2.0 * exposure_s)
-        spare = np.full(2, np.nan)
-        turning = spare
-        if len(imu) > 1:
-            spare = turning = mean_over(imu[:, 0], imu[:, 1:4], start, end)[0, :2]
-        elif len(self._attitude) > 1:
-            attitude = np.array(self._attitude)
-            stream = Stream.of(Sensor.ATTITUDE, attitude[:, 0], attitude[:, 1:5])
-            spare = attitude_rates(stream, start, end)[0, :2]
-        own = [value[2 + i] if np.isfinite(value[2 + i]) else float(spare[i]) for i in range(2)]
-        return [value[0], value[1], *own, *map(float, turning)]
-
-    @staticmethod
-    def _since(rows: deque[tuple[float, ...]], t_s: float) -> Array:
-        """Rows from an instant on, and the one before it."""
-        found = []
-        for row in reversed(rows):
-            found.append(row)
-            if row[0] <= t_s:
-                break
-        return np.array(found[::-1])
+        return 0.5 * float(np.count_nonzero(self.rings.inertial()[:, 0] > t_s - 2.0))
 
 
-def _empty_queue(count: int) -> EventQueue:
-    """Room for so many readings, used again and again; who keeps what is in it copies it."""
-    return EventQueue(
-        np.zeros(count),
-        np.zeros(count, np.int64),
-        np.zeros((count, MAX_VALUES)),
-        np.zeros((count, MAX_VALUES)),
-        np.zeros(count),
-        np.arange(count),
-        np.zeros(count),
-        np.ones(count),
-    )
+def handed_over(reading: Measurement, exposure_s: float, known: IdentifiedFlow | None) -> Given:
+    """A reading as the rings take it: flow in the vehicle's axes."""
+    value: Sequence[float] = reading.value
+    if reading.sensor in FLOW and known is not None and known.axes != UNTURNED:
+        value = in_vehicle_axes(np.array([value]), known, angular=reading.sensor == Sensor.FLOW_RATE)[0].tolist()
+    numbers = numbers_of(value, reading.variance, reading.quality, reading.delay_s, exposure_s)
+    return Given(reading.t_s, int(reading.sensor), numbers)
 
 
-def _streams(listened: list[Waiting]) -> dict[Sensor, Stream]:
+def _streams(listened: EventQueue) -> dict[Sensor, Stream]:
     """What was listened to, as streams."""
-    by_sensor: dict[Sensor, list[Waiting]] = {}
-    for waiting in listened:
-        by_sensor.setdefault(waiting.reading.sensor, []).append(waiting)
     return {
-        sensor: Stream.of(
-            sensor,
-            np.array([w.t_s for w in found]),
-            np.array([w.reading.value for w in found]).reshape(len(found), len(COLUMNS[sensor])),
-            quality=np.array([w.reading.quality for w in found]),
+        Sensor(number): Stream.of(
+            Sensor(number),
+            listened.t_s[rows],
+            listened.value[rows, : len(COLUMNS[Sensor(number)])],
+            quality=listened.quality[rows],
         )
-        for sensor, found in by_sensor.items()
+        for number in np.unique(listened.sensor)
+        for rows in [listened.sensor == number]
     }
+
+
+def own_declination_rad(streams: dict[Sensor, Stream]) -> float:
+    """Where nobody says where on earth the vehicle is: the bearing of the field by the autopilot's own attitude [rad].
+
+    The frame that is sent is then the autopilot's, whatever its compass and its idea of north are. 0 without attitude.
+    """
+    mag, attitude = streams.get(Sensor.MAG), streams.get(Sensor.ATTITUDE)
+    if mag is None or attitude is None or not len(mag) or not len(attitude):
+        return 0.0
+    before = np.clip(np.searchsorted(attitude.t_s, mag.t_s), 0, len(attitude.t_s) - 1)
+    angles = []
+    for field, quaternion in zip(mag.value, attitude.value[before], strict=True):
+        rotation = rotation_from_quaternion(*map(float, quaternion))
+        north, east, _ = to_earth(rotation, *map(float, field))
+        angles.append(math.atan2(east, north))
+    return math.atan2(float(np.mean(np.sin(angles))), float(np.mean(np.cos(angles))))
 
 
 def _own_gyro_is_dead(streams: dict[Sensor, Stream]) -> bool:

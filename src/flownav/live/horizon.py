@@ -1,16 +1,15 @@
-"""Readings on their way to the navigator: which source serves, how far streams lag, the delayed horizon, and alarms.
+"""Readings on their way to the navigator: which source serves, how far streams lag, and alarms.
 
 Of each kind of sensor one source serves, the preferred message that is alive. Readings wait until everything of their
 instant must have arrived, as long as the slowest stream runs behind the newest reading, then go on in its order. A
 sensor that is heard and does not serve is an alarm, since what is sent then rests on less than the vehicle has.
 """
 
-import heapq
 from collections import Counter, deque
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from flownav.core.measurement import Measurement, Sensor
+from flownav.core.measurement import Sensor
 from flownav.estimation.gating import Reason
 from flownav.logs.mavlink.messages import PREFERENCE
 from flownav.navigation.reasons import HORIZONTAL, REFUSALS
@@ -21,8 +20,7 @@ SILENT_S = 2.0  # a source that says nothing for so long gives way
 # with a horizon that did not follow it, all fixes came too late on most starts.
 WINDOW_S = 5.0
 PATIENT_WINDOWS = 4  # a stream that comes in time again is waited for so many windows longer
-MOST_WAITING = 8192  # chosen: ten seconds of a busy link; a flood is dropped and counted (test_live_safety)
-WATCHED = (*HORIZONTAL, Sensor.RANGE)
+WATCHED = (*HORIZONTAL, Sensor.RANGE, Sensor.LANDED)
 DOWNWARD = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.RANGE)  # on the ground they need not serve
 LATE = Reason.LATE.label
 LEAST_READINGS = 10  # chosen: 2 s of a 5 Hz receiver
@@ -48,24 +46,42 @@ class Sources:
 
     def __init__(self) -> None:
         self.dropped: Counter[Sensor] = Counter()
+        self.barred: dict[Sensor, set[Source]] = {}
+        self.first: dict[Sensor, str] = {}  # a message that goes before all others here
         self._chosen: dict[Sensor, _Chosen] = {}
+
+    def chosen(self, sensor: Sensor) -> Source | None:
+        """The source that serves; None where none has."""
+        found = self._chosen.get(sensor)
+        return found.source if found is not None else None
+
+    def bar(self, sensor: Sensor, source: Source) -> None:
+        """This source must not serve any more; the next one that speaks does."""
+        self.barred.setdefault(sensor, set()).add(source)
+        if self.chosen(sensor) == source:
+            del self._chosen[sensor]
 
     def takes(self, sensor: Sensor, source: Source, t_s: float) -> bool:
         """Take a reading of a source at an instant. A better or a lone source takes over from a silent one."""
-        if sensor == Sensor.FLOW_VELOCITY and self._alive(Sensor.FLOW_RATE, t_s):
+        if sensor == Sensor.FLOW_VELOCITY and self.alive(Sensor.FLOW_RATE, t_s):
             self.dropped[sensor] += 1  # the same flow, before it was multiplied by a range
+            return False
+        if source in self.barred.get(sensor, ()):
+            self.dropped[sensor] += 1
             return False
         order = PREFERENCE.get(sensor, ())
         place = order.index(source.message) if source.message in order else len(order)
+        place = -1 if source.message == self.first.get(sensor) else place
         rank = place, not source.by_autopilot, source.instance
         chosen = self._chosen.get(sensor)
-        if chosen is not None and chosen.source != source and chosen.rank <= rank and self._alive(sensor, t_s):
+        if chosen is not None and chosen.source != source and chosen.rank <= rank and self.alive(sensor, t_s):
             self.dropped[sensor] += 1
             return False
         self._chosen[sensor] = _Chosen(source, rank, t_s)
         return True
 
-    def _alive(self, sensor: Sensor, t_s: float) -> bool:
+    def alive(self, sensor: Sensor, t_s: float) -> bool:
+        """Whether the source that serves has spoken lately."""
         chosen = self._chosen.get(sensor)
         return chosen is not None and abs(t_s - chosen.heard_s) <= SILENT_S
 
@@ -125,67 +141,6 @@ class Lags:
         return min(max(least_s, max(self.by_sensor.values(), default=0.0) + margin_s), most_s)
 
 
-class Waiting(NamedTuple):
-    """A reading in the queue: the instant it describes [s], its place among equals, and itself.
-
-    exposure_s: for how long a flow reading looked, 0 for others.
-    """
-
-    t_s: float
-    order: int
-    reading: Measurement
-    exposure_s: float = 0.0
-
-
-class Horizon:
-    """Readings in the order of the instants they describe, released when these are old enough.
-
-    dropped counts by sensor and reason: `late`, of an instant that was already released; `overflow`, where too many
-    wait.
-    """
-
-    def __init__(self) -> None:
-        self.dropped: Counter[str] = Counter()
-        self._waiting: list[Waiting] = []
-        self._order = 0
-        self._released_s = float("-inf")
-
-    def __len__(self) -> int:
-        return len(self._waiting)
-
-    def take(self, reading: Measurement, exposure_s: float = 0.0) -> bool:
-        """Queue a reading; False where it was dropped and counted."""
-        t_s = reading.t_s - reading.delay_s
-        if t_s < self._released_s:
-            self.dropped[f"{reading.sensor.name.lower()}: late"] += 1
-            return False
-        if len(self._waiting) >= MOST_WAITING:
-            self.dropped[f"{reading.sensor.name.lower()}: overflow"] += 1
-            return False
-        self._order += 1
-        heapq.heappush(self._waiting, Waiting(t_s, self._order, reading, exposure_s))
-        return True
-
-    def release(self, until_s: float, most: int) -> list[Waiting]:
-        """The readings of instants up to `until_s`, in order, `most` at a time."""
-        released: list[Waiting] = []
-        while self._waiting and self._waiting[0].t_s <= until_s and len(released) < most:
-            released.append(heapq.heappop(self._waiting))
-        if not self._waiting or self._waiting[0].t_s > until_s:
-            self._released_s = max(self._released_s, until_s)
-        elif released:
-            self._released_s = max(self._released_s, released[-1].t_s)
-        return released
-
-    def waiting(self) -> list[Waiting]:
-        """What waits, in order."""
-        return sorted(self._waiting)
-
-    def clear(self) -> None:
-        """Forget what waits; instants before the newest released stay gone."""
-        self._waiting.clear()
-
-
 class Refused(NamedTuple):
     """A spell in which no reading of a sensor was fused: since and until when, how many, and why the last."""
 
@@ -200,11 +155,11 @@ class Serving:
 
     def __init__(self) -> None:
         self._spells: dict[Sensor, Refused] = {}
-        self._landed = False
+        self._landed = self._denied = False
 
     def refused(self, sensor: Sensor, t_s: float, why: str) -> None:
         """A reading that never got to the navigator."""
-        if sensor not in WATCHED or (self._landed and sensor in DOWNWARD):
+        if sensor not in WATCHED or (self._landed and not self._denied and sensor in DOWNWARD):
             return
         before = self._spells.get(sensor)
         if before is None or t_s - before.until_s > GONE_S:
@@ -215,22 +170,24 @@ class Serving:
         """What became of readings in the navigator."""
         for row in offered:
             sensor, component, reason = Sensor(int(row.sensor)), int(row.component), int(row.reason)
+            if sensor == Sensor.LANDED:
+                self._denied = reason == Reason.INNOVATION_GATE
             if reason == Reason.FUSED and component < 2:
                 self._spells.pop(sensor, None)
             elif reason in REFUSALS and component == 0:
                 self.refused(sensor, row.t_s, Reason(reason).label)
 
     def landed(self, on_ground: bool) -> None:
-        """What the autopilot says of the ground."""
+        """What the autopilot says of the ground; the navigator may deny it (`judged`)."""
         self._landed = on_ground
-        if on_ground:
+        if on_ground and not self._denied:
             for sensor in DOWNWARD:
                 self._spells.pop(sensor, None)
 
     def clear(self) -> None:
         """The navigation begins anew."""
         self._spells.clear()
-        self._landed = False
+        self._landed = self._denied = False
 
     def alarms(self, t_s: float, after_s: float) -> dict[Sensor, Refused]:
         """Sensors of which nothing was fused for `after_s` although they speak."""

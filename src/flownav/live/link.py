@@ -9,6 +9,7 @@ import os
 import re
 import select
 import socket
+import struct
 import time
 from collections import Counter, deque
 from collections.abc import Callable
@@ -25,6 +26,7 @@ FORMS = (
 LOOPBACK, LOOPBACK_6, EVERYWHERE_6 = "127.0.0.1", "::1", "::"
 DEFAULT_BAUD = 115200  # a bare PX4FLOW's
 MOST_BYTES = 65536  # the largest datagram
+SO_MEMINFO = 55  # Linux, asm-generic/socket.h: nine uint32, the last of them the datagrams dropped (sock_diag.h)
 MOST_READS = 64  # in a row, before the session has its turn: chosen
 USB = re.compile(r"ttyACM|tty\.usbmodem|cu\.usbmodem|COM\d+$")  # ports whose baud rate is a formality
 BITS_A_BYTE = 10  # with start and stop bit
@@ -90,8 +92,9 @@ def resolved(host: str, port: int) -> tuple[socket.AddressFamily, tuple[Any, ...
 
 
 class Link:
-    """What a session is run over. counts: `not_sent`, `replaced`, `unreachable`, `other_sender`, `reconnected`.
+    """What a session is run over.
 
+    counts: `not_sent`, `replaced`, `unreachable`, `other_sender`, `reconnected`, `overflowed` (datagrams too many).
     received, written: bytes so far. capacity_bytes_s: what it carries each way; None where that is not known.
     """
 
@@ -109,6 +112,10 @@ class Link:
     def read(self) -> list[Piece]:
         """What has arrived, without waiting."""
         raise NotImplementedError
+
+    def overheard(self) -> list[bytes]:
+        """Datagrams of the last `read` that came from elsewhere than the vehicle that is believed."""
+        return []
 
     def write(self, frame: bytes) -> None:
         """Send a frame, or drop and count it."""
@@ -157,6 +164,7 @@ class UdpLink(Link):
             self._socket.close()
             raise
         self._peer = self._named
+        self._overheard: list[bytes] = []
         self.port = int(self._socket.getsockname()[1])
 
     def fileno(self) -> int:
@@ -174,7 +182,10 @@ class UdpLink(Link):
     def read(self) -> list[Piece]:
         """Whole datagrams."""
         pieces: list[Piece] = []
-        for _ in range(MOST_READS):
+        self._overheard = []
+        for turn in range(MOST_READS):
+            if turn == MOST_READS - 1:  # more comes than is read at once
+                self._count_overflow()
             try:
                 piece, sender = self._socket.recvfrom(MOST_BYTES)
             except BlockingIOError:
@@ -184,10 +195,22 @@ class UdpLink(Link):
                 continue
             if self._peer is not None and not same_sender(sender, self._peer):
                 self.counts["other_sender"] += 1
+                self._overheard.append(piece)
             else:
                 self.received += len(piece)
                 pieces.append((piece, sender))
         return pieces
+
+    def _count_overflow(self) -> None:
+        """Datagrams for which the socket's buffer had no room, as the system counts them."""
+        with suppress(OSError, struct.error):
+            lost = struct.unpack_from("I", self._socket.getsockopt(socket.SOL_SOCKET, SO_MEMINFO, 36), 32)[0]
+            if lost:
+                self.counts["overflowed"] = lost
+
+    def overheard(self) -> list[bytes]:
+        """Of other senders, at most MOST_READS."""
+        return self._overheard
 
     def write(self, frame: bytes) -> None:
         """A datagram; nothing where nobody has spoken yet."""

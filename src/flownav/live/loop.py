@@ -4,6 +4,7 @@ Before it begins kernels are loaded, and the process asks to run before others w
 """
 
 import gc
+import math
 import os
 import signal
 import sys
@@ -16,10 +17,9 @@ from typing import Self
 import numpy as np
 
 from flownav.core.compile import announce_compilation
-from flownav.core.measurement import COLUMNS, Measurement, Sensor
+from flownav.core.measurement import COLUMNS, Sensor
 from flownav.live.answers import estimate_of
 from flownav.live.filtering import Filtering, Keeper
-from flownav.live.horizon import Waiting
 from flownav.live.link import Link, waited
 from flownav.live.options import Options
 from flownav.live.session import Session
@@ -27,6 +27,7 @@ from flownav.live.simulated import SimulatedVehicle
 from flownav.logs.mavlink.framing import coder
 from flownav.logs.mavlink.outgoing import odometry
 from flownav.logs.mavlink.position_messages import local_position_m
+from flownav.navigation.rings import Given, numbers_of
 
 PRIORITY = 1  # the least of the real-time ones: before every ordinary process, behind the system's own
 NICE = -10
@@ -70,16 +71,17 @@ def warm_up() -> None:
     """
     filtering = Filtering(Options(), Keeper())
     readings = [
-        Waiting(0.1 * step, step, Measurement(0.1 * step, sensor, (0.1,) * len(COLUMNS[sensor]), (np.nan,) * 6), 0.1)
+        Given(0.1 * step, int(sensor), numbers_of((0.1,) * len(COLUMNS[sensor]), exposure_s=0.1))
         for step, sensor in enumerate([Sensor.ATTITUDE, Sensor.IMU, Sensor.IMU, *Sensor])
     ]
     with announce_compilation("live"):
-        filtering.begin(readings, gps_heard=True)
         for reading in readings:
-            filtering.heard(reading)
-        filtering.feed(readings)
+            filtering.rings.take(reading)
+        filtering.rings.take_back(0.15)
+        filtering.begin(gps_heard=True)
+        filtering.feed(math.inf)
         assert filtering.running is not None
-        estimate = estimate_of(filtering.running, filtering.imu_after(-1.0), 1.0, 1.0, 0)
+        estimate = estimate_of(filtering.running, filtering.now(1.0), 1.0, 1.0, 0)
     local_position_m((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     mav = coder()
     mav.decode(bytearray(odometry(mav, estimate).pack(mav)))
@@ -183,9 +185,13 @@ def run_session(
             latency.take(clock() - flow_s)
         return NAN
 
+    turns = 0
     with Collector(spoke_s) as collector:
         while not stop():
             waited(link, WAIT_S)
+            if session.turns > turns:  # the vehicle is another one, which may speak from elsewhere
+                turns = session.turns
+                link.forget()
             for piece, sender in link.read():
                 now_s = clock()
                 flow = session.due
@@ -195,6 +201,8 @@ def run_session(
                 if session.due and not flow:
                     flow_s = NAN if session.reason else now_s  # where nothing is sent, nothing waits
                     flow_s = tick()
+            for piece in link.overheard():
+                session.overhear(piece)
             flow_s, now_s = tick(), clock()
             if now_s - spoke_s > SILENT_S:
                 link.forget()

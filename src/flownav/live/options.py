@@ -19,8 +19,8 @@ class Limits:
     age_s: of the newest reading of the vehicle. dead_reckoning_s: of the newest horizontal aid that was fused, the
     horizon's wait included; a vehicle that flies on the estimate moves on what it says, so this is short. sigma_m,
     sigma_m_s: one standard deviation of horizontal position and velocity. protection_m: how far off the position may be
-    although no fault is noticed, the horizontal protection level. unfused_s: for how long a horizontal sensor may speak
-    without being fused.
+    although no fault is noticed, the horizontal protection level. sigma_down_m: one of the height. unfused_s: for how
+    long a horizontal sensor may speak without being fused.
     """
 
     age_s: float = 0.3
@@ -28,6 +28,7 @@ class Limits:
     sigma_m: float = 5.0
     sigma_m_s: float = 1.5
     protection_m: float = 20.0
+    sigma_down_m: float = 10.0
     unfused_s: float = 5.0
 
 

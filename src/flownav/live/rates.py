@@ -15,6 +15,8 @@ from flownav.logs.mavlink.framing import ARDUPILOT, PX4
 ARDUPILOT_MOST_HZ = 1.0 / 0.021
 PX4_LEAST_HZ = 30.0  # of estimates; EKF2 does not fuse fewer (docs/en/ros/external_position_estimation.md)
 # message: id and rate [Hz]; the IMU moves the state, the others correct it
+# Other inertial sensors are heard beside the one that serves (live/inertial.py); a vehicle without them says nothing.
+OTHER_IMU = {"SCALED_IMU2": (116, 50), "SCALED_IMU3": (129, 50)}
 COMMON = {
     "ATTITUDE_QUATERNION": (31, 50),
     "DISTANCE_SENSOR": (132, 25),
@@ -24,8 +26,17 @@ COMMON = {
     "SYSTEM_TIME": (2, 1),
 }
 STREAMS = {
-    True: {"RAW_IMU": (27, 100), "OPTICAL_FLOW": (100, 50), **COMMON},  # ArduPilot
-    False: {"HIGHRES_IMU": (105, 100), "OPTICAL_FLOW_RAD": (106, 250), "OPTICAL_FLOW": (100, 250), **COMMON},
+    True: {"RAW_IMU": (27, 100), "OPTICAL_FLOW": (100, 50), **OTHER_IMU, **COMMON},  # ArduPilot
+    # PX4 says nowhere that it is simulated, and a vehicle has no truth to tell
+    False: {
+        "SCALED_IMU": (26, 100),
+        "HIGHRES_IMU": (105, 100),
+        "OPTICAL_FLOW_RAD": (106, 250),
+        "OPTICAL_FLOW": (100, 250),
+        **OTHER_IMU,
+        **COMMON,
+        "HIL_STATE_QUATERNION": (115, 25),
+    },
 }
 # Of the line; the rest is for HEARTBEAT, TIMESYNC, texts, answers and what others ask of the vehicle. Asked for
 # everything, 115200 baud lose 67 frames a second and readings are 109 ms old; with this none, and 15 (live.md).
@@ -35,16 +46,21 @@ LOOK_S = 5.0  # chosen
 SIGNATURE_BYTES = 13
 # bytes of a MAVLink 2 frame, as ArduPilot and PX4 fill them (zeros at a payload's end are not sent)
 FRAME_BYTES = {
-    "RAW_IMU": 41, "HIGHRES_IMU": 75, "OPTICAL_FLOW": 46, "OPTICAL_FLOW_RAD": 56, "ATTITUDE_QUATERNION": 44,
+    "RAW_IMU": 41, "SCALED_IMU": 36, "SCALED_IMU2": 36, "SCALED_IMU3": 36, "HIGHRES_IMU": 75,
+    "OPTICAL_FLOW": 46, "OPTICAL_FLOW_RAD": 56, "ATTITUDE_QUATERNION": 44,
     "DISTANCE_SENSOR": 51, "GPS_RAW_INT": 64, "SCALED_PRESSURE": 28, "EXTENDED_SYS_STATE": 14, "SYSTEM_TIME": 24,
     "SIM_STATE": 96, "HIL_STATE_QUATERNION": 76,
 }  # fmt: skip
 ESTIMATE_BYTES = {"odometry": 244, "vision": 129 + 69, "landing-target": 72, "none": 0}
-ABSENT = {True: (), False: ("OPTICAL_FLOW",)}  # by ArduPilot or not: asked for in case, and takes no part of the line
+ABSENT = {
+    True: ("SCALED_IMU3",),
+    False: ("OPTICAL_FLOW", "SCALED_IMU2", "SCALED_IMU3", "HIL_STATE_QUATERNION"),
+}  # by ArduPilot or not: asked for in case, and takes no part of the line
 TRUTHS = ("SIM_STATE", "HIL_STATE_QUATERNION")
 # in this order: messages, and the rate that they come down to [Hz]
 STEPS: tuple[tuple[tuple[str, ...], float], ...] = (
     (TRUTHS, 5),
+    (("SCALED_IMU2", "SCALED_IMU3"), 1),  # too few below 30 Hz to hold another against (live/inertial.py)
     (("SCALED_PRESSURE",), 5),
     (("OPTICAL_FLOW_RAD", "OPTICAL_FLOW"), 100),
     (("ATTITUDE_QUATERNION",), 25),
@@ -53,6 +69,7 @@ STEPS: tuple[tuple[tuple[str, ...], float], ...] = (
     (("OPTICAL_FLOW_RAD", "OPTICAL_FLOW"), 50),
     (TRUTHS, 1),
     (("ATTITUDE_QUATERNION",), 10),
+    (("SCALED_IMU",), 1),  # of PX4, whose HIGHRES_IMU then serves
     (("HIGHRES_IMU", "RAW_IMU"), 50),
     (("OPTICAL_FLOW_RAD", "OPTICAL_FLOW"), 25),
     (("SCALED_PRESSURE", "EXTENDED_SYS_STATE"), 2),

@@ -118,7 +118,7 @@ class Requests:
             heard_s = before.heard_s if before is not None else float("-inf")
             self._streams[name] = _Stream(number, rate_hz, now_s, heard_s, SILENT_S)
             if name not in self._left[bool(self._tries) :]:  # one that is under way was asked for at the old rate
-                self._left.append(name)
+                self._left.insert(bool(self._tries), name)  # what is asked for now is needed now
 
     @property
     def settled(self) -> bool:

@@ -67,6 +67,8 @@ def traffic_facts(
         "estimates_replaced": link.counts["replaced"],
         "flow_without_own_estimate": session.hearing.flow_waited,
         "frames_not_sent": link.counts["not_sent"],
+        "datagrams_lost": link.counts["overflowed"],
+        "slow_reader": session.backlog.spells if session.backlog is not None else 0,
     }
 
 
@@ -83,6 +85,9 @@ def in_words(facts: Mapping[str, Any]) -> str:
     said += [f"TOO SLOW for {facts['too_slow_for']}"] if facts["too_slow_for"] else []
     replaced, not_sent = facts["estimates_replaced"], facts["frames_not_sent"]
     said += [f"not sent: {replaced} old estimates, {not_sent} other frames"] if replaced or not_sent else []
+    lost = facts["datagrams_lost"]
+    said += [f"LOST {lost} datagrams: more came than could be read"] if lost else []
+    said += ["the reader is SLOW, and was sent fewer estimates"] if facts["slow_reader"] else []
     return "; ".join(said)
 
 

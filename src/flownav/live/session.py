@@ -1,40 +1,43 @@
 """A live session as a state machine: bytes and the time in, frames out. It has no clock and no socket of its own.
 
 Bytes become messages of one vehicle (reception), these become measurements on the vehicle's clock (hearing), which wait
-at the horizon until all of their instant must be here, and are then fed to the navigator (filtering). Its state,
+on rings until all of their instant must be here, and are then fed to the navigator (filtering). Its state,
 carried on to now, is sent where nothing speaks against it (answers).
 """
 
 from collections import Counter, deque
 
 from flownav.core.measurement import Sensor
-from flownav.live.answers import UNFUSED, WITHHELD, Answers, estimate_of, fault_of, why_withheld
+from flownav.live.anchor import PLACES
+from flownav.live.answers import WITHHELD, Answers
+from flownav.live.backlog import Backlog
 from flownav.live.filtering import BATCH_READINGS, Filtering, Keeper
 from flownav.live.hearing import Hearing
 from flownav.live.horizon import Refused
+from flownav.live.offering import Offering
 from flownav.live.options import Options
 from flownav.live.rates import Rates
-from flownav.live.reception import Reception, Vehicle, VehicleClock
+from flownav.live.reception import Reception, Vehicle
 from flownav.live.requests import TRUTHS, Requests, Simulator
+from flownav.live.vehicle_clock import VehicleClock
 from flownav.logs.mavlink.converted import Pose
 from flownav.logs.mavlink.framing import Message
-from flownav.logs.mavlink.messages import CONVERTERS, STATES, TrueState
-from flownav.logs.mavlink.outgoing import ODOMETRY_COMPONENT, Estimate, companion_heartbeat
+from flownav.logs.mavlink.messages import CONVERTERS, STATES, LocalState, TrueState
+from flownav.logs.mavlink.outgoing import ARMED, ODOMETRY_COMPONENT, Estimate, companion_heartbeat
 from flownav.navigation.feed import SLOWEST_IMU_HZ
-from flownav.navigation.reasons import HORIZONTAL
 from flownav.navigation.rows import InnovationRow
 
+LOCAL_POSITION = "LOCAL_POSITION_NED"
 SECOND_S = 1.0
-SEND_EVERY_S = 0.02  # without flow, above EKF2's 30 Hz; with it, an estimate for each of its readings
-OUTRANKED = ("", "position_invalid", "dead_reckoning", "unprotected")  # what a sensor that does not serve may cause
+SEND_EVERY_S = 0.03  # without flow, above EKF2's 30 Hz; with it, an estimate for each of its readings
 NAN = float("nan")
 
 
 class Session:
     """One link's session. `now_s` is always our monotonic clock; `unix_s` is UNIX time at `now_s` of the start.
 
-    dropped: what was not taken, by where and why; sent and withheld: estimates, the latter by reason; alarms: sensors
-    that are heard and not fused, since when and why.
+    dropped: what was not taken, by where and why; sent and withheld: estimates, the latter by reason; velocities: those
+    withheld of which the velocity was sent; turns: how often another autopilot was taken for the vehicle.
     """
 
     def __init__(self, options: Options, keeper: Keeper, now_s: float, unix_s: float) -> None:
@@ -43,15 +46,19 @@ class Session:
         self.reception = Reception(
             options.system, options.component, options.key, unix_s, options.accept, ODOMETRY_COMPONENT
         )
+        self._others_said = 0
+        self.backlog = Backlog() if options.capacity_bytes_s is None else None  # a line of a known pace is kept to it
+        self._doubted: tuple[float, float, float] | None = None
         self.rates = Rates(options.capacity_bytes_s, options.send, signed=options.key is not None)
         self.answers, self.requests, self.simulator = Answers(options), Requests(self.rates), Simulator()
-        self.hearing, self.filtering = Hearing(options), Filtering(options, keeper)
+        self.filtering = Filtering(options, keeper)
+        self.hearing = Hearing(options, self.filtering.rings)
+        self.offering = Offering(options.limits, keeper, self.hearing, self.filtering)
         self.clock: VehicleClock | None = None
         self.withheld: Counter[str] = Counter()
-        self.sent = 0
+        self.sent = self.velocities = self.turns = 0
+        self.armed = False
         self.reason = "no_vehicle"
-        self.alarms: dict[Sensor, Refused] = {}
-        self.past_alarms: dict[Sensor, Refused] = {}  # the longest of each sensor
         self.estimate: Estimate | None = None
         self.outbox: deque[bytes] = deque(maxlen=1024)
         self.innovations: dict[tuple[int, int], tuple[float, float, int]] = {}  # innovation, test ratio, reason
@@ -72,9 +79,14 @@ class Session:
         return self.hearing.origin.navigator_deg_m
 
     @property
+    def alarms(self) -> dict[Sensor, Refused]:
+        """Sensors that are heard and not fused, since when and why."""
+        return self.offering.alarms
+
+    @property
     def resets(self) -> int:
         """Jumps of what is sent: starts, resets of the filter, and a new origin of the autopilot."""
-        return self.filtering.jumps + self.hearing.origin.moves
+        return self.filtering.jumps + self.hearing.origin.moves + self.offering.anchor.moves
 
     @property
     def due(self) -> bool:
@@ -100,12 +112,39 @@ class Session:
                 self._told(message, self.clock, vehicle, now_s)
             if message.msgname in CONVERTERS:
                 self._measured(message, self.clock, vehicle, now_s)
+        self._say_others(now_s)
         overfull = self.rates.heard(len(piece), now_s, settled=self.requests.settled)
         if overfull and self.reception.vehicle is not None and self.clock is not None:
             self.requests.revise(self.reception.vehicle, now_s)
             t_s = self.clock.now_s(now_s)
             self.keeper.note(t_s, "link", "overfull", "streams are asked for at lower rates", self.rates.plan.bytes_s)
         return self.reception.received > before
+
+    def _say_others(self, now_s: float) -> None:
+        """Other autopilots go into the record, each once."""
+        others = self.reception.others
+        if len(others) > self._others_said and self.clock is not None:
+            self._others_said = len(others)
+            names = ", ".join(f"{system}.{component}" for system, component in others)
+            self.keeper.note(self.clock.now_s(now_s), "link", "other_autopilot", names, NAN)
+
+    def overhear(self, piece: bytes) -> None:
+        """A datagram from elsewhere than the vehicle."""
+        if not self.offering.settled:
+            self.reception.overhear(piece)
+
+    def _choose(self, now_s: float) -> None:
+        """Before anything was sent, a better autopilot takes the place of the one that was heard first."""
+        better, before = self.reception.better(now_s), self.reception.vehicle
+        if better is None or before is None or self.clock is None:
+            return
+        names = [f"{one.system}.{one.component}" for one in (better, before)]
+        said = f"{names[0]} is taken for the autopilot, in place of {names[1]}"
+        self._restart(self.clock.now_s(now_s), said, NAN)
+        self.reception.take(better)
+        self._vehicle_s = NAN
+        self.turns += 1
+        self._meet(better, now_s)
 
     def _meet(self, vehicle: Vehicle, now_s: float) -> None:
         self.clock = VehicleClock(vehicle.system, vehicle.component)
@@ -117,7 +156,7 @@ class Session:
         """The vehicle may be elsewhere now: the navigation begins anew."""
         self.hearing.begin_anew()
         self.filtering.stop()
-        self.alarms = {}
+        self.offering.begin_anew()
         self.keeper.note(t_s, "link", "restart", why, value)
 
     def _told(self, message: Message, clock: VehicleClock, vehicle: Vehicle, now_s: float) -> None:
@@ -128,12 +167,18 @@ class Session:
             self.requests.revise(vehicle, now_s, {truth.name: (truth.number, truth.rate_hz)})
         if name == "TIMESYNC":
             self._timesync(message, clock, vehicle, now_s)
+        elif name == "HEARTBEAT":
+            self.armed = bool(message.base_mode & ARMED)
         elif name == "COMMAND_ACK":
             self.requests.acknowledged(message)
         elif name == "SYSTEM_TIME":
             clock.told_unix(message, vehicle.system, vehicle.component)
         elif name == "GPS_GLOBAL_ORIGIN":
             self._origin_told(message, clock.now_s(now_s))
+        elif name == LOCAL_POSITION:
+            said = STATES[name](message)
+            if isinstance(said, LocalState):
+                self.offering.say_origin(self.hearing.origin.stands(said.pos_ned_m), clock.now_s(now_s))
         elif name in TRUTHS:
             state, t_s = STATES[name](message), clock.now_s(now_s)
             if isinstance(state, TrueState) and t_s == t_s:
@@ -141,6 +186,8 @@ class Session:
 
     def _timesync(self, message: Message, clock: VehicleClock, vehicle: Vehicle, now_s: float) -> None:
         t_s = clock.now_s(now_s)
+        if message.tc1 and self.backlog is not None and self.backlog.answered(message.ts1, now_s):
+            return
         if not message.tc1:
             if t_s == t_s:  # known
                 self._send(self.answers.timesync_answer(message, clock.boot_s(t_s)), now_s)
@@ -151,17 +198,19 @@ class Session:
     def _origin_told(self, message: Message, t_s: float) -> None:
         origin = self.hearing.origin
         place = message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3
-        event = origin.told(place)
-        if event == "moved":
-            offset_m = sum(value**2 for value in origin.offset_ned_m) ** 0.5
-            self.keeper.note(t_s, "origin", "moved", "the autopilot set its origin; what is sent is about it", offset_m)
-        elif event == "refused":
-            self.hearing.counts["origin: refused"] += 1
-            self.keeper.note(t_s, "origin", "refused", f"{place[0]:.5f}, {place[1]:.5f}: the vehicle is not near it")
+        nowhere = origin.about_deg_m is None
+        event = origin.told(place, settled=self.offering.settled)
+        if nowhere and not event and self.filtering.lacks_gps and not self.armed:
+            self.filtering.stop()  # which way is north is known now; one that flies goes on as it is
+            self.keeper.note(t_s, "link", "restart", "origin_came", NAN)
+        self.offering.say_origin(event, t_s)
 
     def _measured(self, message: Message, clock: VehicleClock, vehicle: Vehicle, now_s: float) -> None:
         here_ned_m = self.filtering.here_ned_m if self.origin_deg_m is None else None
-        event = self.hearing.take(message, clock, vehicle, self._pose(), now_s, self.filtering.heard, here_ned_m)
+        event = self.hearing.take(message, clock, vehicle, self._pose(), now_s, here_ned_m)
+        while self.hearing.swaps:
+            since_s, source, why = self.hearing.swaps.popleft()
+            self.keeper.note(since_s, "imu", why, f"{source.message} is not believed any more", NAN)
         if event == "clock_jump":
             self._restart(clock.now_s(now_s), event, NAN)
 
@@ -173,20 +222,30 @@ class Session:
     def tick(self, now_s: float) -> None:
         """Feed what is due, and send what is due: estimates, requests, heartbeats."""
         hearing = self.hearing
+        if not self.offering.settled:
+            self._choose(now_s)
         if self.clock is None or self.reception.vehicle is None:
             return
         t_s = self.clock.now_s(now_s)
+        if hearing.origin.doubted not in (None, self._doubted):
+            self.requests.revise(self.reception.vehicle, now_s, {LOCAL_POSITION: (32, 2.0)})
+            self.keeper.note(t_s, "origin", "doubted", "it is far off; the autopilot is asked where it is in it", NAN)
+        self._doubted = hearing.origin.doubted
         if self.origin_deg_m is not None and self.origin_deg_m != self._origin_kept:
             self._origin_kept = self.origin_deg_m
             self.keeper.origin(t_s, self.origin_deg_m)
         listened = t_s - hearing.since_s >= self.options.listen_s
-        if self.filtering.running is None and listened and len(hearing.horizon):
-            self.filtering.begin(hearing.horizon.waiting(), hearing.gps_heard, self.origin_deg_m)
+        if self.filtering.running is None and listened and len(hearing.rings):
+            self.filtering.begin(hearing.gps_heard, hearing.origin.about_deg_m)
         if self.filtering.lacks_imu and self.filtering.imu_rate_hz(hearing.newest_s) >= SLOWEST_IMU_HZ:
             self._restart(t_s, "imu_came", NAN)  # it was decided without one, which serves now
+        elif self.filtering.lacks_gps and hearing.gps_heard and not self.armed:
+            self.filtering.stop()  # and is begun with GPS at once; one that flies goes on as it is
+            self.keeper.note(t_s, "link", "restart", "gps_came", NAN)
         until_s = min(t_s, hearing.lags.newest_s) - hearing.horizon_s
         behind = self.filtering.running is not None and self._feed(until_s)
         since_s = now_s - self._sent_s
+        behind = behind or not self._is_read(t_s, now_s)
         if not behind and (self.due or since_s >= SEND_EVERY_S) and since_s >= self.rates.estimate_every_s:
             hearing.flow_came, self._sent_s = False, now_s
             self._offer(t_s, now_s)
@@ -201,51 +260,44 @@ class Session:
 
     def _feed(self, until_s: float) -> bool:
         """A batch: what was listened to for seconds must not hold up what arrives now. True where more is due."""
-        released = self.hearing.horizon.release(until_s, BATCH_READINGS)
-        if released:
-            outcome = self.filtering.feed(released)
+        outcome = self.filtering.feed(until_s)
+        if outcome.readings:
             offered = [InnovationRow(*row) for row in outcome.innovation.tolist()]
             for row in offered:
                 told = row.innovation, row.test_ratio, int(row.reason)
                 self.innovations[int(row.sensor), int(row.component)] = told
             self.hearing.serving.judged(offered)
-        return len(released) == BATCH_READINGS
-
-    def _watch(self, t_s: float) -> None:
-        """Alarms that begin and end go into the record."""
-        found = self.hearing.serving.alarms(t_s, self.options.limits.unfused_s)
-        for sensor in found.keys() - self.alarms.keys():
-            spell = found[sensor]
-            self.keeper.note(t_s, sensor.name.lower(), "unfused", spell.why, t_s - spell.since_s)
-        for sensor in self.alarms.keys() - found.keys():
-            self.keeper.note(t_s, sensor.name.lower(), "fused_again", "", NAN)
-        for sensor, spell in found.items():
-            before = self.past_alarms.get(sensor)
-            if before is None or spell.until_s - spell.since_s >= before.until_s - before.since_s:
-                self.past_alarms[sensor] = spell
-        self.alarms = found
+            self.offering.heights.judged(offered)
+        return outcome.readings == BATCH_READINGS
 
     def _offer(self, t_s: float, now_s: float) -> None:
-        """Send the estimate of now, or say why not."""
-        on, vehicle, clock, limits = self.filtering.running, self.reception.vehicle, self.clock, self.options.limits
+        """Send the estimate of now, or what of it may be sent, or say why not."""
+        vehicle = self.reception.vehicle
         assert vehicle is not None
-        assert clock is not None
-        self._watch(t_s)
-        reason = why_withheld(on, t_s, self.hearing.newest_s, limits)
-        if reason in OUTRANKED and any(sensor in HORIZONTAL for sensor in self.alarms):
-            reason = UNFUSED
-        if not reason and on is not None:
-            imu = self.filtering.imu_after(self.filtering.clock_s)
+        assert self.clock is not None
+        self.offering.watch(t_s)
+        reason, estimate = self.offering.judged(t_s, self.clock, self.resets)
+        if (
+            reason in PLACES
+            and self.filtering.running is not None
+            and self.offering.anchor.may_move(self.filtering.running, t_s)
+        ):
+            self.offering.anchor.move(self.filtering.running, jumps=bool(self.reason))
+            self.keeper.note(t_s, "live", "anchored", f"{reason}: what is sent is about where the vehicle is now", NAN)
+            reason, estimate = self.offering.judged(t_s, self.clock, self.resets)
+        messages: list[Message] = []
+        if estimate is not None and not reason:
+            self.estimate = estimate
             offset_ned_m = self.hearing.origin.offset_ned_m
-            self.estimate = estimate_of(on, imu, t_s, clock.boot_s(t_s), self.resets, offset_ned_m, limits)
-            reason = fault_of(self.estimate, limits)
-            if not reason and self.options.send == "none":
-                reason = "nothing_asked"
-            messages = [] if reason else self.answers.estimates(vehicle, self.estimate, on, offset_ned_m)
-            if not reason and not messages:
-                reason = "no_pad"
-            for message in messages:
-                self._send(message, now_s)
+            assert self.filtering.running is not None
+            messages = self.answers.estimates(vehicle, estimate, self.filtering.running, offset_ned_m)
+            reason = "" if messages else "nothing_asked" if self.options.send == "none" else "no_pad"
+        elif estimate is not None and reason in PLACES:
+            messages = self.answers.velocity(vehicle, estimate)
+            self.velocities += bool(messages)
+        for message in messages:
+            self._send(message, now_s)
+        self.offering.settled |= reason in ("", "nothing_asked")
         if reason:
             self.withheld[reason] += 1
         else:
@@ -255,5 +307,22 @@ class Session:
             self.keeper.note(t_s, "live", kind, WITHHELD.get(reason, ""), NAN)
             self.reason = reason
 
+    def _is_read(self, t_s: float, now_s: float) -> bool:
+        """Whether what was sent is read in time, so that more may follow; asks for it."""
+        backlog = self.backlog
+        if backlog is None:
+            return True
+        spells, is_open = backlog.spells, backlog.is_open(now_s)
+        if backlog.spells > spells:
+            self.keeper.note(t_s, "link", "slow_reader", "what is sent is not read in time; fewer estimates are", NAN)
+        if backlog.due(now_s):
+            question = self.answers.timesync(now_s)
+            self._send(question, now_s)
+            backlog.asked(question.ts1, now_s)
+        return is_open
+
     def _send(self, message: Message, now_s: float) -> None:
-        self.outbox.append(self.answers.packed(message, now_s + self._unix_less_now_s))
+        frame = self.answers.packed(message, now_s + self._unix_less_now_s)
+        self.outbox.append(frame)
+        if self.backlog is not None:
+            self.backlog.put(len(frame))

@@ -36,7 +36,9 @@ MAY_LACK = {  # NaN: not measured
     Sensor.FLOW_RATE: (2, 3), Sensor.FLOW_VELOCITY: (2,), Sensor.GPS_VELOCITY: (0, 1, 2), Sensor.PAD: (2,),
 }  # fmt: skip
 PLACE = ("lat_deg", "lon_deg", "alt_m")
-MOST_BYTES = 4 << 30  # of a log that is read whole
+MOST_BYTES = 1 << 30  # of a log that is read whole, which takes two or three times as much memory
+SLOW_S, HELD_S = 0.01, 0.1  # a slow sensor's value stands in every row: again only if it changed, or after this long
+QUICK_S = 0.015  # rows that follow each other faster are a quick logger's: barometers give 50 readings a second at most
 SEA_LEVEL_PA = 101325.0
 SCALE_HEIGHT_M, ALTITUDE_EXPONENT = 44330.77, 0.1902632  # the standard atmosphere's troposphere
 
@@ -89,6 +91,32 @@ def drop_duplicates(rows: Rows) -> None:
     for values in rows.columns.values():
         again[1:] &= (values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1]))
     rows.keep(~again, "duplicate")
+
+
+def fresh_rows(t_s: Array, value: Array) -> NDArray[np.bool_]:
+    """Rows that say something new of a slow sensor, logged at the rate of a fast one: value (n, k).
+
+    A changed value, or the same after HELD_S; SLOW_S apart at the least.
+    """
+    changed = np.append(True, (np.diff(value, axis=0) != 0).any(axis=1))
+    keep = np.zeros(len(t_s), bool)
+    taken = -np.inf
+    pending = False
+    for row, t in enumerate(t_s.tolist()):
+        pending = pending or bool(changed[row])
+        if t < taken or (pending and t - taken >= SLOW_S) or t - taken >= HELD_S:
+            keep[row], taken, pending = True, t, False
+    return keep
+
+
+def readings_once(t_s: Array, value: Array) -> NDArray[np.bool_]:
+    """The fresh rows of a slow sensor where its rows come quicker than it measures; all of them where they do not.
+
+    Repeated, a barometer of 25 Hz counted as 950 readings a second, and its noise as averaged away.
+    """
+    if len(t_s) < 2 or not np.median(np.diff(t_s)) < QUICK_S:
+        return np.ones(len(t_s), bool)
+    return fresh_rows(t_s, value)
 
 
 def longest_ordered(t_s: Array) -> NDArray[np.bool_]:
@@ -243,13 +271,15 @@ def keep_fixes(fixes: Rows, fix_type: Array) -> None:
 def streams_of_fixes(
     fixes: Rows, velocity: Array, velocity_variance: Array, position_variance: Array, delay_s: float
 ) -> tuple[list[Stream], Origin | None]:
-    """Velocity (n, 3), then position about the first of the fixes, and that fix; nothing without one."""
+    """Velocity (n, 3), then position about the first of the fixes, and that fix; nothing without one.
+
+    No velocity where the receiver never tells one: it is a sensor that is not there, not one that fails.
+    """
     if not len(fixes):
         return [], None
-    told = (
-        (Sensor.GPS_VELOCITY, velocity, velocity_variance),
-        (Sensor.GPS_POSITION, local_position(fixes), position_variance),
-    )
+    told = [(Sensor.GPS_POSITION, local_position(fixes), position_variance)]
+    if np.isfinite(velocity).any():
+        told.insert(0, (Sensor.GPS_VELOCITY, velocity, velocity_variance))
     return [
         Stream.of(
             sensor, fixes.t_s, value, variance=possible_variance(variance), delay_s=delay_s, rejected=fixes.rejected
@@ -265,12 +295,16 @@ def pressure_altitude_m(pressure_pa: Array) -> Array:
     return np.where(possible, SCALE_HEIGHT_M * (1.0 - ratio**ALTITUDE_EXPONENT), np.nan)
 
 
-def content_of(path: Path, what: str, most_bytes: int | None = None) -> bytes:
-    """A file's bytes. InputError where it cannot be read or is larger than such a log ever is."""
+def content_of(path: Path, what: str, most_bytes: int = MOST_BYTES) -> bytes:
+    """A file's bytes. InputError where it cannot be read, or is larger than such a log ever is or than the memory."""
     try:
-        if most_bytes is not None and an_input(path).stat().st_size > most_bytes:
+        size = an_input(path).stat().st_size
+        if size > most_bytes:
             raise InputError(f"{path}: larger than {most_bytes >> 20} MB; cut the log into pieces")
-        return an_input(path).read_bytes()
+        with path.open("rb") as file:
+            return file.read(size)
+    except MemoryError as error:
+        raise InputError(f"{path}: {size >> 20} MB do not fit into the memory; cut the log into pieces") from error
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); give {what}") from error
 

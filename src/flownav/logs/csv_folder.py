@@ -15,7 +15,7 @@ from flownav.core.frames import quaternion_from_euler
 from flownav.core.guard import an_input
 from flownav.core.measurement import COLUMNS, Sensor, Stream
 from flownav.core.record import POSITION_NED, Table
-from flownav.logs.assembly import local_position, near_the_rest, origin_of
+from flownav.logs.assembly import local_position, near_the_rest, origin_of, readings_once
 from flownav.logs.csv_table import Column, CsvTable, read_csv_table
 from flownav.logs.log import Log, absences_of
 from flownav.logs.plausible import check_plausible
@@ -140,15 +140,14 @@ def _attitude(table: CsvTable) -> list[Stream]:
 
 
 def _gps(table: CsvTable) -> list[Stream]:
-    """Velocity first: a filter that starts at a fix then knows how fast."""
+    """Velocity first: a filter that starts at a fix then knows how fast. None where no cell of it has one."""
     table.keep(table.columns["fix_type"] >= 3, "no_fix")
     if not len(table.t_s):
         raise InputError(f"{table.path}: no row has a 3-D fix (fix_type 3 or more); remove the file to replay without")
     table.keep(near_the_rest(table.columns["lat_deg"], table.columns["lon_deg"]), "out_of_range")
-    return [
-        table.stream(Sensor.GPS_VELOCITY, *COLUMNS[Sensor.GPS_VELOCITY]),
-        Stream.of(Sensor.GPS_POSITION, table.t_s, local_position(table), rejected=table.rejected),
-    ]
+    velocity = table.stream(Sensor.GPS_VELOCITY, *COLUMNS[Sensor.GPS_VELOCITY])
+    position = Stream.of(Sensor.GPS_POSITION, table.t_s, local_position(table), rejected=table.rejected)
+    return [velocity, position] if np.isfinite(velocity.value).any() else [position]
 
 
 def _px4flow(table: CsvTable) -> list[Stream]:
@@ -165,8 +164,15 @@ def _range(table: CsvTable) -> list[Stream]:
     return [table.stream(Sensor.RANGE, "range_m")]
 
 
+def _baro(table: CsvTable) -> list[Stream]:
+    table.keep(readings_once(table.t_s, table.matrix("alt_m")), "repeated")
+    return [table.stream(Sensor.BARO, "alt_m")]
+
+
 def _mag(table: CsvTable) -> list[Stream]:
-    field = 1e-3 * table.matrix("mag_x_mgauss", "mag_y_mgauss", "mag_z_mgauss")
+    names = ("mag_x_mgauss", "mag_y_mgauss", "mag_z_mgauss")
+    table.keep(readings_once(table.t_s, table.matrix(*names)), "repeated")
+    field = 1e-3 * table.matrix(*names)
     return [Stream.of(Sensor.MAG, table.t_s, field, rejected=table.rejected)]
 
 
@@ -177,7 +183,7 @@ CONVERTERS: dict[str, Callable[[CsvTable], list[Stream]]] = {
     "px4flow": _px4flow,
     "flow": lambda table: [table.stream(Sensor.FLOW_RATE, *COLUMNS[Sensor.FLOW_RATE], quality="quality")],
     "range": _range,
-    "baro": lambda table: [table.stream(Sensor.BARO, "alt_m")],
+    "baro": _baro,
     "mag": _mag,
     "landed": lambda table: [table.stream(Sensor.LANDED, "landed")],
 }

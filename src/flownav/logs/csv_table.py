@@ -4,6 +4,7 @@ Bad rows are thrown away and counted by reason. Where so many are bad that the f
 names say (a wrong unit, two logs in one file), that is an InputError of one line.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from flownav.core.arrow_columns import as_numpy
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.text import number
@@ -18,6 +20,8 @@ from flownav.logs.assembly import LATE_SHARE, Rows, content_of, drop_duplicates,
 
 WRONG_UNIT_SHARE = 0.1  # more rows than this outside the limits: the column is in another unit
 LONGEST_MEDIAN_STEP_S = 10.0
+MOST_COLUMNS = 1000
+MOST_HEADER_BYTES = 1 << 18
 
 
 @dataclass(frozen=True)
@@ -103,7 +107,7 @@ def _parse(path: Path, content: bytes, wanted: list[str], malformed: list[int]) 
     try:
         try:
             table = parse(pa.float64())
-            return {name: np.array(table[name].to_numpy(), float) for name in names}
+            return {name: as_numpy(table[name]) for name in names}
         except pa.ArrowInvalid:
             table = parse(pa.string())
             return {name: np.array([_number(text) for text in table[name].to_pylist()]) for name in names}
@@ -115,9 +119,14 @@ def _parse(path: Path, content: bytes, wanted: list[str], malformed: list[int]) 
 
 def _header(path: Path, content: bytes) -> list[str]:
     """Column names of the first line."""
-    line = content.split(b"\n", 1)[0].decode("utf-8-sig", errors="replace")
+    end = content.find(b"\n", 0, MOST_HEADER_BYTES)
+    if end < 0 and len(content) > MOST_HEADER_BYTES:
+        raise InputError(f"{path}: its first line has more than {MOST_HEADER_BYTES} bytes; a CSV table is needed")
+    line = content[: end if end >= 0 else len(content)].decode("utf-8-sig", errors="replace")
     header = [name.strip().strip('"') for name in line.split(",")]
-    twice = sorted({name for name in header if name and header.count(name) > 1})
+    if len(header) > MOST_COLUMNS:
+        raise InputError(f"{path}: {len(header)} columns; at most {MOST_COLUMNS} are read")
+    twice = sorted(name for name, count in Counter(header).items() if name and count > 1)
     if twice:
         raise InputError(f"{path}: column {', '.join(twice)} stands twice in the first line; keep one")
     return header

@@ -15,6 +15,7 @@ import numpy as np
 from flownav.core.frames import quaternion_product, rotation_from_quaternion, to_body
 from flownav.core.measurement import Array, EventQueue, Sensor, Stream
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Table
+from flownav.logs.happened import Happened
 
 TRUTH_FILE, SIMULATOR, VISUAL_ODOMETRY = "truth.csv", "the simulator", "visual odometry"
 
@@ -50,6 +51,10 @@ class Log:
     settings and what else shaped it.
     limits: what a sensor states of itself, lowest and highest, by name with unit ("range_m", "flow_height_m",
     "flow_rad_s"). absences: what the log lacks.
+    parameters: the vehicle's own settings by name, as last written; empty where the log has none. happened: what it
+    says besides its sensors, in order of time (`logs/happened.py`). setpoints: what the autopilot asked for, in the
+    frame of its estimate: tables of position and of attitude, each at its own times. battery: columns as
+    record.TABLES["battery"].
     """
 
     path: Path
@@ -67,6 +72,10 @@ class Log:
     fed_settings: dict[str, Any] = field(default_factory=dict)
     heading_truth: Table | None = None
     truth_name: str = TRUTH_FILE
+    parameters: dict[str, float] = field(default_factory=dict)
+    happened: tuple[Happened, ...] = ()
+    setpoints: tuple[Table, ...] = ()
+    battery: Table | None = None
 
     @property
     def span_s(self) -> tuple[float, float]:
@@ -135,6 +144,13 @@ def ned_from_frd_of_nwu(wxyz: Array) -> Array:
 
 
 # -- attitudes and rates ------------------------------------------------------------------------------------
+def integrated(value: Array, step_s: Array) -> Array:
+    """The integral of samples from the first on, linear between them; value (n,) or (n, k), step_s (n - 1,)."""
+    path = np.zeros(value.shape)
+    np.cumsum(0.5 * (value[1:] + value[:-1]) * step_s.reshape(-1, *[1] * (value.ndim - 1)), axis=0, out=path[1:])
+    return path
+
+
 def mean_over(t_s: Array, value: Array, start_s: Array, end_s: Array) -> Array:
     """Mean of sampled columns over intervals, linear between the samples; value (n, k) -> (m, k).
 
@@ -145,8 +161,7 @@ def mean_over(t_s: Array, value: Array, start_s: Array, end_s: Array) -> Array:
     means = np.empty((len(start_s), value.shape[1]))
     for k in range(value.shape[1]):
         column = np.ascontiguousarray(value[:, k])
-        integral = np.zeros(len(t_s))
-        np.cumsum(0.5 * (column[1:] + column[:-1]) * step_s, out=integral[1:])
+        integral = integrated(column, step_s)
         begun, ended = (
             np.interp(at, t_s, integral) + before * column[0] + after * column[-1]
             for at, (before, after) in zip((start_s, end_s), outside, strict=True)

@@ -15,17 +15,20 @@ from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import RATES, Table
 from flownav.logs.assembly import Origin, content_of, local_ned, near_the_rest, sha256_of
 from flownav.logs.log import SIMULATOR, Log, absences_of, attitude_at, in_order, state_table
+from flownav.logs.mavlink.asked import ASKING, Asked
 from flownav.logs.mavlink.clock import Aligned, ClockState, align, stamp_of, told_unix_time
 from flownav.logs.mavlink.converted import Context, Dropped, Pose
 from flownav.logs.mavlink.framing import ARDUPILOT, INVALID_AUTOPILOT, PX4, Frame, Message, coder, dialect, tlog_frames
 from flownav.logs.mavlink.messages import CONVERTERS, STATES, LocalState, instance_of, measurements
 from flownav.logs.mavlink.position_messages import LEAST_FIX, fix_deg_m
+from flownav.logs.mavlink.said import Said
 from flownav.logs.mavlink.sensor_messages import range_limits_m
 from flownav.logs.mavlink_streams import Gathered, Source
 from flownav.logs.plausible import of_one_clock
 
 AUTOPILOTS = {ARDUPILOT: "ArduPilot", PX4: "PX4"}
-WANTED = {*CONVERTERS, *STATES, "SYSTEM_TIME", "PARAM_VALUE"}
+TELLING = ("HEARTBEAT", "STATUSTEXT", "PARAM_VALUE")
+WANTED = {*CONVERTERS, *STATES, "SYSTEM_TIME", *TELLING, *ASKING}
 NOTHING = (
     "no usable reading of any sensor; have the autopilot send ATTITUDE or HIGHRES_IMU at 20 Hz or more, and "
     "GPS_RAW_INT or OPTICAL_FLOW_RAD"
@@ -91,7 +94,7 @@ class Flight:
         self.states: dict[str, list[tuple[float, Any]]] = {name: [] for name in STATES}
         self.counts: Counter[str] = Counter()
         self.limits: dict[str, tuple[float, float]] = {}
-        self._parameters: dict[str, float] = {}
+        self.said, self.asked = Said(vehicle.make), Asked(vehicle.make)
         self._quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
         self._pose: Pose | None = None
         self._vehicle = vehicle
@@ -122,8 +125,10 @@ class Flight:
             unix = (frame.system, frame.component, "unix")
             unix_s, boot_s = message.time_unix_usec * 1e-6, message.time_boot_ms * 1e-3
             self._clock = told_unix_time(self._clock, unix, unix_s, boot_s)
-        elif name == "PARAM_VALUE":
-            self._parameters[str(message.param_id)] = float(message.param_value)
+        elif name in TELLING and own:
+            self.said.take(aligned.t_s, message)
+        elif name in ASKING and own and not aligned.reason:
+            self.asked.take(aligned.t_s, message)
 
     def _measured(self, frame: Frame, message: Message, aligned: Aligned, own: bool) -> None:
         context = Context(own and self._vehicle.make == ARDUPILOT, own, self.origin_deg_m, self._pose)
@@ -152,9 +157,14 @@ class Flight:
         if isinstance(state, LocalState):
             self._pose = Pose(state.pos_ned_m, self._quaternion)
 
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Those that the ground station asked for."""
+        return {name: value for name, value in self.said.parameters.items() if np.isfinite(value)}
+
     def _flow_limits(self) -> None:
         """PX4's parameters of the flow sensor, where the ground station asked for them."""
-        known = {name: value for name, value in self._parameters.items() if np.isfinite(value)}
+        known = self.parameters
         if known.get("SENS_FLOW_MAXR", 0.0) > 0.0:
             self.limits["flow_rad_s"] = (0.0, known["SENS_FLOW_MAXR"])
         if known.get("SENS_FLOW_MAXHGT", 0.0) > known.get("SENS_FLOW_MINHGT", 0.0) >= 0.0:
@@ -255,6 +265,8 @@ def read_tlog(path: Path, *, flow_instance: int | None = None) -> Log:
         (*choice, *_damage_notes(damage, frames), *_flight_notes(flight), *chosen, *strays),
         flight.autopilot(streams.get(Sensor.ATTITUDE)), vehicle.name, flight.limits,
         tuple(absences_of(streams, **LACKING)), clock_start_s=0.0, truth_name=SIMULATOR,
+        parameters=flight.parameters, happened=flight.said.happened(),
+        setpoints=flight.asked.setpoints(), battery=flight.asked.battery(),
     )  # fmt: skip
 
 

@@ -7,7 +7,8 @@ from pathlib import Path
 from flownav.core.errors import InputError, arg
 from flownav.core.guard import an_input
 from flownav.core.measurement import Sensor
-from flownav.logs.crazyflie import looks_like as looks_like_crazyflie
+from flownav.logs.crazyflie_blocks import looks_like as looks_like_crazyflie
+from flownav.logs.dataflash.text_form import is_text
 from flownav.logs.journal import MAGIC as JOURNAL_MAGIC
 from flownav.logs.journal import SUFFIX as JOURNAL_SUFFIX
 from flownav.logs.log import Log
@@ -106,6 +107,8 @@ def log_kind(path: Path) -> str:
     if head.startswith(BAG_MAGICS) or path.suffix.lower() in (".mcap", ".db3"):
         return "ros"
     if head.startswith(DATAFLASH_MAGIC) or (path.suffix.lower() == ".bin" and DATAFLASH_FORMAT in head):
+        return "dataflash"
+    if is_text(head):
         return "dataflash"
     if path.suffix.lower() == ".fnr" and head.startswith(ZIP_MAGIC):
         return "record"

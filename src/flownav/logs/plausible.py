@@ -14,16 +14,15 @@ import numpy as np
 from flownav.core.errors import InputError
 from flownav.core.frames import rotation_from_quaternion
 from flownav.core.measurement import Array, Sensor, Stream
+from flownav.core.record import LATEST_S, LONGEST_S
 from flownav.logs.log import attitude_at, attitude_rates, mean_over
 
-LONGEST_LOG_S = 172_800.0
 # beyond these, in a stream's own unit, a record is damaged: far more than what a live link or a simulation lets through
 LARGEST = {
     Sensor.GPS_POSITION: 1e8, Sensor.GPS_VELOCITY: 1e6, Sensor.FLOW_RATE: 1e6, Sensor.FLOW_VELOCITY: 1e6,
     Sensor.RANGE: 1e7, Sensor.IMU: 1e7, Sensor.ATTITUDE: 2.0, Sensor.BARO: 1e8, Sensor.MAG: 1e6, Sensor.POSE: 1e8,
     Sensor.YAW: 1e6, Sensor.PAD: 1e7, Sensor.LANDED: 1.0,
 }  # fmt: skip
-LATEST_S = 1e10  # a clock of UNIX seconds shows 2e9, and its double tells microseconds apart
 GRAVITY_LIMITS_M_S2 = (4.0, 25.0)
 LARGEST_TILT_ERROR_RAD = 0.6
 WRONG_UNIT_FACTOR = 10.0
@@ -37,10 +36,11 @@ LEAST_GPS_TRAVEL_M = 5.0
 LEAST_FIELD_GAUSS = 0.05
 
 
-def check_plausible(where: Path, streams: dict[Sensor, Stream]) -> None:
+def check_plausible(where: Path, streams: dict[Sensor, Stream], *, flow: bool = True) -> None:
     """InputError where two sensors cannot be in the stated units, axes and signs at the same time.
 
-    Nothing is compared without an attitude.
+    Nothing is compared without an attitude. flow: False leaves the flow sensor out: in an autopilot's own file it can
+    only be the vehicle that has it turned, and such a log is to be read.
     """
     check_times(where, streams)
     if Sensor.ATTITUDE not in streams:
@@ -49,10 +49,10 @@ def check_plausible(where: Path, streams: dict[Sensor, Stream]) -> None:
     if Sensor.IMU in streams:
         _check_gravity(where, streams[Sensor.IMU], attitude)
         _check_rates(where, "imu gyro", streams[Sensor.IMU], (0, 1, 2), attitude, signed=True)
-    if Sensor.FLOW_RATE in streams:
+    if flow and Sensor.FLOW_RATE in streams:
         _check_rates(where, "flow gyro", streams[Sensor.FLOW_RATE], (2, 3), attitude, signed=True)
         _check_rates(where, "flow", streams[Sensor.FLOW_RATE], (0, 1), attitude, signed=False)
-    if Sensor.GPS_POSITION in streams:
+    if Sensor.GPS_POSITION in streams and Sensor.GPS_VELOCITY in streams:
         _check_gps(where, streams[Sensor.GPS_POSITION], streams[Sensor.GPS_VELOCITY])
     if Sensor.MAG in streams:
         field = float(np.median(np.linalg.norm(streams[Sensor.MAG].value, axis=1)))
@@ -67,7 +67,7 @@ def check_times(where: Path, streams: dict[Sensor, Stream]) -> None:
     """
     spans = {s.name.lower(): (float(t.t_s[0]), float(t.t_s[-1])) for s, t in streams.items() if len(t)}
     for name, (first, last) in spans.items():
-        if last - first > LONGEST_LOG_S:
+        if last - first > LONGEST_S:
             raise InputError(
                 f"{where}: {name} covers {first:g} to {last:g} s, more than two days; the clock has leapt: cut the log "
                 "there"
@@ -79,7 +79,7 @@ def check_times(where: Path, streams: dict[Sensor, Stream]) -> None:
     (early, (first, _)), (late, (_, last)) = (
         min(spans.items(), key=lambda span: span[1][0]), max(spans.items(), key=lambda span: span[1][1])
     )  # fmt: skip
-    if last - first > LONGEST_LOG_S:
+    if last - first > LONGEST_S:
         raise InputError(
             f"{where}: {early} begins at {first:g} s and {late} ends at {last:g} s, more than two days apart; all "
             "sensors need one clock, in seconds"
@@ -112,7 +112,7 @@ def of_one_clock(where: Path, found: Iterable[Stream | None], nothing: str) -> t
         raise InputError(f"{where}: {nothing}")
     starts = sorted(float(stream.t_s[0]) for stream in streams.values() if len(stream))
     usual = starts[(len(starts) - 1) // 2] if starts else 0.0
-    far = {s for s, stream in streams.items() if len(stream) and abs(stream.t_s[0] - usual) > LONGEST_LOG_S}
+    far = {s for s, stream in streams.items() if len(stream) and abs(stream.t_s[0] - usual) > LONGEST_S}
     notes = [
         f"{sensor.name.lower()} is left out: its clock shows {streams[sensor].t_s[0]:g} s where the others' show "
         f"{usual:g} s ({len(streams[sensor])} readings)"
@@ -127,7 +127,7 @@ def _check_gravity(where: Path, imu: Stream, attitude: Stream) -> None:
     if len(imu) < LEAST_ROWS:
         return
     force = imu.value[:, 3:]
-    size = float(np.median(np.linalg.norm(force, axis=1)))
+    size = float(np.linalg.norm(np.median(force, axis=0)))  # what a vehicle that shakes feels in the middle
     if not GRAVITY_LIMITS_M_S2[0] < size < GRAVITY_LIMITS_M_S2[1]:
         raise InputError(f"{where}: imu accel: a median of {size:.3g} m/s2 is not gravity; m/s2 are needed (g? mg?)")
     rotation = rotation_from_quaternion(*attitude_at(attitude, imu.t_s).T)

@@ -14,6 +14,8 @@ from flownav.logs.log import SIMULATOR, VISUAL_ODOMETRY, Absence, Log, absences_
 from flownav.logs.plausible import of_one_clock
 from flownav.logs.ulog_flow import FLOW_TOPICS, flow_stream, flow_topic, range_stream, reading_limits
 from flownav.logs.ulog_references import autopilot_estimate, pose_stream, truth_of
+from flownav.logs.ulog_said import ASKED, SAID, battery, happened, setpoints
+from flownav.logs.ulog_said import FIELDS as SAID_FIELDS
 from flownav.logs.ulog_topics import Topic, Topics, read_topics
 
 STATES = ("vehicle_land_detected",)
@@ -38,6 +40,7 @@ TOPICS = (
     "vehicle_attitude_groundtruth",
     "landing_target_pose",
     "irlock_report",
+    *SAID,
 )
 FIELDS = frozenset(
     (
@@ -62,6 +65,7 @@ FIELDS = frozenset(
         "magnetometer_timestamp_relative",
         # landing
         "landed", "x_rel", "y_rel", "z_rel", "rel_pos_valid", "pos_x", "pos_y",
+        *SAID_FIELDS,
     )
 )  # fmt: skip
 
@@ -73,7 +77,7 @@ def read_ulog(path: Path, *, flow_instance: int | None = None) -> Log:
     log lacks stands in `Log.absences`, what was thrown away in `Stream.rejected`, damage of the file in `Log.notes`.
     InputError where the file cannot be read, is no ULog, holds no known sensor, or lacks that flow instance.
     """
-    topics = read_topics(path, TOPICS, FIELDS, STATES)
+    topics = read_topics(path, TOPICS, FIELDS, (*STATES, *SAID))
     return log_of_topics(path, topics, flow_instance, inputs={path.name: topics.sha256})
 
 
@@ -115,6 +119,8 @@ def log_of_topics(
         autopilot, _estimator(topics) if autopilot is not None else "", reading_limits(topics, flow),
         tuple(absences), clock_start_s=topics.start_s,
         truth_name=reference_name or (VISUAL_ODOMETRY if truth_note else SIMULATOR),
+        parameters=dict(topics.parameters), happened=happened(topics), setpoints=setpoints(topics),
+        battery=battery(topics),
     )  # fmt: skip
 
 
@@ -146,7 +152,7 @@ def _unusable(topics: Topics) -> list[str]:
     return [
         f"{topic.label}: no usable row ({', '.join(f'{count} {reason}' for reason, count in topic.rejected.items())})"
         for topic in topics.found
-        if not len(topic)
+        if not len(topic) and topic.name not in ASKED
     ]
 
 

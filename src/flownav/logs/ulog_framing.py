@@ -36,6 +36,7 @@ LARGEST_MESSAGE = 0xFFFF
 LARGEST_TOPIC = 8192  # bytes; uORB's largest have a quarter of that
 DEEPEST_NESTING = 8
 MOST_BAD_FORMATS = 1000
+LOGGED, MOST_MESSAGES = struct.Struct("<BQ"), 2000  # a logged string's level and time; how many are kept
 APPENDED_FLAG = 1  # the one incompatible flag that is known: data appended at stated offsets
 
 header_at = struct.Struct("<HB").unpack_from
@@ -49,7 +50,7 @@ class Framed:
     content: their definitions as a sound ULog with one row of each. rows: where all of their rows begin, by message id,
     in the file's order. dropouts_s: gaps that the logger itself states [s].
     rejected: messages by reason. damaged: number of stretches skipped, and their bytes.
-    system: who says that it wrote the log ("PX4").
+    system: who says that it wrote the log ("PX4"). messages: logged strings with the clock's time [s].
     """
 
     content: bytes = b""
@@ -60,6 +61,7 @@ class Framed:
     damaged_stretches: int = 0
     damaged_bytes: int = 0
     system: str = ""
+    messages: list[tuple[float, str]] = field(default_factory=list)
 
     def count(self, reason: str) -> None:
         """One more message thrown away."""
@@ -260,6 +262,10 @@ class Framing:
             framed.system = framed.system or plain(self.content[named.end() : stop].decode(errors="replace"))
         elif kind == 65:
             self._subscribe(pos, stop)
+        elif kind == 76 and stop - pos > LOGGED.size + 3 and len(framed.messages) < MOST_MESSAGES:
+            time_us = LOGGED.unpack_from(self.content, pos + 3)[1]
+            text = self.content[pos + 3 + LOGGED.size : stop].decode(errors="replace")
+            framed.messages.append((1e-6 * time_us, plain(text.strip())))
         elif kind == 79:
             framed.dropouts_s.append(1e-3 * id_at(self.content, pos + 3)[0])
 

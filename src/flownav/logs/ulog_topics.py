@@ -75,7 +75,8 @@ class Topic(Rows):
 class Topics:
     """The wanted topics of a file, parameters, and what was wrong with the file.
 
-    start_s: what the file's clock shows at time 0 of the topics. system: who says that it wrote the log.
+    start_s: what the file's clock shows at time 0 of the topics. system: who says that it wrote the log. messages:
+    logged strings with the file's own time [s].
     """
 
     found: list[Topic]
@@ -84,6 +85,7 @@ class Topics:
     start_s: float
     notes: list[str] = field(default_factory=list)
     system: str = ""
+    messages: list[tuple[float, str]] = field(default_factory=list)
 
     def of(self, *names: str) -> list[Topic]:
         """Every instance of the named topics that has rows, in the order of the names."""
@@ -120,7 +122,7 @@ def read_topics(path: Path, wanted: Collection[str], fields: Collection[str], st
         )
     stated = {str(name): float(value) for name, value in log.initial_parameters.items()}
     parameters = {name: value for name, value in stated.items() if np.isfinite(value)}
-    return Topics(found, parameters, sha256, start_s, _notes(framed), framed.system)
+    return Topics(found, parameters, sha256, start_s, _notes(framed), framed.system, framed.messages)
 
 
 def _content(path: Path) -> tuple[mmap, str]:

@@ -4,10 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.core.compile import Lanes, Work, procedure
+from flownav.core.compile import Lanes, Work, equation, procedure
+from flownav.estimation.covariance import consider, consider_none
 from flownav.estimation.laws.height import baro_altitude
 from flownav.estimation.named import PositionNed
-from flownav.estimation.states import BARO
+from flownav.estimation.states import ACCEL_BIAS, BARO, GROUND, POSITION, VELOCITY
+from flownav.navigation.memory import GROUNDED
 from flownav.navigation.offers import conclude, note_height
 from flownav.navigation.packed import load_height_settings
 from flownav.navigation.reasons import FUSED, usable_in_flight
@@ -45,12 +47,25 @@ def judge_baro(
     )
 
 
+@equation
+def consider_height(work: Work, lanes: Lanes) -> None:
+    """Pressure is no judge of the height of a vehicle that stands, or of which nobody knows yet: it settles then what
+    the barometer's offset is. One that began 10 m wrong had lifted a vehicle off its pad before the first window ended.
+    """
+    consider(work, lanes, POSITION + 2, GROUNDED)
+    consider(work, lanes, VELOCITY + 2, GROUNDED)
+    consider(work, lanes, ACCEL_BIAS + 2, GROUNDED)
+    consider(work, lanes, GROUND, GROUNDED)
+
+
 @procedure
 def take_baro(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
     """Height from pressure."""
     s = load_height_settings(p)
     judge_baro(work, lanes, t_s, s, OF_BARO, o)
+    consider_height(work, lanes)
     baro_altitude(work, lanes, 0)
     conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
+    consider_none(work, lanes)
     follow_noise(work, lanes, t_s, OF_BARO, s.gate_sigma)
     note_height(work, lanes, t_s)

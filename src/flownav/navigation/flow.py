@@ -10,13 +10,15 @@ from flownav.estimation.covariance import consider
 from flownav.estimation.laws.flow import body_velocity, flow_rate
 from flownav.estimation.named import VelocityNed
 from flownav.estimation.states import ATTITUDE, COMPASS, GROUND, GYRO_BIAS, INS_ERROR, POSITION, VELOCITY
-from flownav.navigation.flow_judge import gyro_share, hold_back, judge_look, see_ground, see_turning
+from flownav.navigation.fault_signs import sign_flow
+from flownav.navigation.flow_judge import gyro_share, hold_back, judge_look, see_ground, see_turning, sum_looks
 from flownav.navigation.flow_noise import (
     DOUBTED_RATIO,
     LONGEST_STEP_S,
     alike,
     blind_variance,
     blindness,
+    disputed_variance,
     flow_variance,
     followed_agreement,
     followed_excess,
@@ -30,10 +32,8 @@ from flownav.navigation.lagged_flow import observe_lagged
 from flownav.navigation.memory import RANGE_MISSING, holds
 from flownav.navigation.offers import conclude, note_aid
 from flownav.navigation.packed import load_flow_settings
-from flownav.navigation.protection import sign_flow
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT, component_of
 from flownav.navigation.records import FlowInnovation, FlowMemory, GpsMemory, Look, Reading
-from flownav.navigation.still import watch_flow
 from flownav.navigation.tape import FLOW_DOUBTED, FLOW_TRUSTED, Output
 from flownav.navigation.told import FlowSettings, carries_lag, flow_gain
 from flownav.navigation.trust import watch_whiteness
@@ -49,6 +49,7 @@ from flownav.navigation.verdicts import (
     Tested,
     on_lanes,
 )
+from flownav.navigation.windows import watch_flow
 
 with_agreement = replacing(FlowMemory, "excess", "ratio", "likeness")
 with_verdict = replacing(FlowMemory, "taken_s", "doubted", "wrong_s", "usual")
@@ -89,6 +90,7 @@ def offer_component(
     per_speed = 1.0 / (look.range_m * look.range_m) if angular else 1.0
     stated = np.nan if angular else listed
     noise = m.excess * flow_variance(look.range_m, speed, reading.quality, angular, s)
+    noise += disputed_variance(look, speed) if angular else 0.0
     model = per_speed * (noise + blind_variance(look.range_m, reading.quality, m.usual, t_s - m.taken_s, s))
     variance = (stated if np.isfinite(stated) else model) / (gain * gain)
     absent = component == 2 and not np.isfinite(raw)
@@ -193,6 +195,8 @@ def take_flow(
     """
     s = load_flow_settings(p)
     angular = sensor == Sensor.FLOW_RATE
+    if angular and lag is None:
+        sum_looks(work, lanes, t_s)
     see_ground(work, lanes, t_s, s)
     if angular:
         see_turning(work, lanes, t_s, gyro_is_imu, s)

@@ -1,5 +1,7 @@
 """The verdict on a flow reading, and the turning that it saw: laws of one reading, its memory and the settings."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from flownav.core.compile import cos, equation, exp, larger, replacing, smaller
@@ -15,11 +17,13 @@ from flownav.navigation.reasons import (
     OUT_OF_RANGE,
     SILENT,
     TILTED,
+    is_heard,
     usable_in_flight,
 )
 from flownav.navigation.records import (
     EchoMemory,
     FlowMemory,
+    FlowSum,
     GpsMemory,
     GroundMemory,
     HeadingMemory,
@@ -33,11 +37,45 @@ from flownav.navigation.verdicts import Biases, GroundBelow, HeldBack, on_lanes
 
 with_turning = replacing(Look, "turning_x", "turning_y")
 with_reason = replacing(Look, "reason")
+with_values = replacing(Reading, "value_0", "value_1", "value_2", "value_3", "value_4", "value_5", "quality")
+with_arrival = replacing(Reading, "arrived")
 with_gyro = replacing(FlowMemory, "bias_x", "bias_y", "bias_count")
 
 LARGEST_SPREAD = 0.5  # of the height over the ground, of which flow makes no speed: chosen, not measured
 UNKNOWN_RANGE_M = 2.0  # chosen: an angular flow over an unknown height is written down, not fused (NO_HEIGHT)
+DISPUTES_S = 0.3  # so long a range speaks of the height that flow is seen from: chosen
+# A sensor that counts pixels carries the rest of a pixel over to the next look: so long a look sums such errors up to
+# none, where a filter that takes each look for white noise does not. A vehicle's velocity hardly changes meanwhile.
+LEAST_LOOK_S = 0.038
 NEAR_LIMIT = 0.98  # a sensor at its limit reads the limit, whatever the flow: chosen, 2 % for rounding (test_judges)
+
+
+class Summed(NamedTuple):
+    """The reading that is to be judged, which has not arrived while looks are summed up, and the sum."""
+
+    reading: Reading
+    looks: FlowSum
+
+
+@on_lanes
+def sum_looks(reading: Reading, m: FlowSum, *, t_s: float) -> Summed:
+    """Looks of an angular flow that are shorter than LEAST_LOOK_S are summed up to one that is not: its mean."""
+    look_s = t_s - m.heard_s
+    alone = not is_heard(reading) or not look_s < LEAST_LOOK_S or not np.isfinite(reading.value_0 + reading.value_1)
+    new = FlowSum(
+        t_s, m.looked_s + look_s, m.x + look_s * reading.value_0, m.y + look_s * reading.value_1,
+        m.own_x + look_s * reading.value_2, m.own_y + look_s * reading.value_3, m.imu_x + look_s * reading.value_4,
+        m.imu_y + look_s * reading.value_5, m.quality + look_s * reading.quality,
+    )  # fmt: skip
+    ends = not alone and new.looked_s >= LEAST_LOOK_S
+    per = 1.0 / new.looked_s if ends else 1.0
+    mean = with_values(
+        reading, value_0=per * new.x, value_1=per * new.y, value_2=per * new.own_x, value_3=per * new.own_y,
+        value_4=per * new.imu_x, value_5=per * new.imu_y, quality=per * new.quality,
+    )  # fmt: skip
+    nothing = FlowSum(t_s if reading.arrived > 0.0 else m.heard_s, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    waits = with_arrival(reading, arrived=0.0)
+    return Summed(reading if alone else (mean if ends else waits), nothing if alone or ends else new)
 
 
 @equation
@@ -82,6 +120,7 @@ def see_ground(
     known = ground.known > 0.0 and spread_m <= LARGEST_SPREAD * range_m
     disputed = np.isfinite(ranged.refused_s) or echo.stray > MANY_STRAYS
     told = t_s - ranged.taken_s <= s.height_hold_s and not disputed
+    newest = t_s - ranged.tested_s <= DISPUTES_S
     return Look(
         turning_x=0.0,
         turning_y=0.0,
@@ -89,6 +128,7 @@ def see_ground(
         known=1.0 if known else 0.0,
         upright=below.rotation[8],
         unranged=0.0 if told else 1.0,
+        disputed_m=abs(ranged.contradiction_m) if newest and known else 0.0,
         reason=SILENT,
     )
 

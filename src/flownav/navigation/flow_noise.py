@@ -6,7 +6,7 @@ import numpy as np
 
 from flownav.core.compile import clamp, equation, larger, smaller
 from flownav.navigation.height import range_variance
-from flownav.navigation.records import FlowMemory
+from flownav.navigation.records import FlowMemory, Look
 from flownav.navigation.told import FlowSettings
 from flownav.sensors.flow import flow_noise_sigma
 
@@ -21,6 +21,7 @@ DOUBTED_RATIO, TRUSTED_RATIO = 4.0, 2.0
 DOUBT_S = 5.0
 LONGEST_STEP_S = 1.0  # chosen: readings further apart say nothing of each other
 FULL_QUALITY = 255.0
+LEAST_RANGE_M = 0.05  # keeps a share finite: no flow is fused so near
 LEAST_STEP_S = 1e-3  # keeps a division finite
 BETTER_S, WORSE_S = 1.0, 30.0  # texture is lost for 2 to 6 s; followed in 1 s, that is usual (test_outages_of_all_aid)
 
@@ -40,6 +41,17 @@ def flow_variance(range_m: float, speed_m_s: float, quality: float, angular: boo
     spread = range_variance(range_m, s.range_sigma_m, s.range_relative_sigma) / (range_m * range_m)
     scaled = 0.0 if angular else speed_m_s * speed_m_s * spread
     return (stated * stated if s.noise.stated > 0.0 else modelled) + scaled
+
+
+@equation
+def disputed_variance(look: Look, speed_m_s: float) -> float:
+    """What a height errs by makes of an angular flow's velocity [m2/s2]: the share by which the newest range disputes
+    it. speed_m_s: as reported.
+
+    Over a table's edge, or a ledge, flow and range see different ground for a moment, and neither is known to be below.
+    """
+    share = look.disputed_m / larger(look.range_m, LEAST_RANGE_M)
+    return speed_m_s * speed_m_s * share * share
 
 
 @equation

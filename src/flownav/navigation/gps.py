@@ -11,6 +11,7 @@ from flownav.estimation.covariance import covariance_of, expect, states_of, vari
 from flownav.estimation.laws.gps import gps_position, gps_velocity
 from flownav.estimation.laws.still import pad_below
 from flownav.estimation.states import GPS_FAST, GPS_SLOW, GPS_VELOCITY, PAD, POSITION, STATE, VELOCITY
+from flownav.navigation.fault_signs import sign_drift
 from flownav.navigation.memory import MEMORY
 from flownav.navigation.motion_records import SteadyForce
 from flownav.navigation.offers import (
@@ -23,7 +24,6 @@ from flownav.navigation.offers import (
     note_height,
 )
 from flownav.navigation.packed import load_gps_settings
-from flownav.navigation.protection import sign_drift
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT, component_of, usable
 from flownav.navigation.records import (
     FixMemory,
@@ -31,6 +31,7 @@ from flownav.navigation.records import (
     GpsMemory,
     LevelMemory,
     NoiseMemory,
+    RangeMemory,
     Reading,
     RejectionMemory,
     StartMemory,
@@ -43,9 +44,14 @@ from flownav.navigation.verdicts import Event, Force, Noise, Offer, Reset, Teste
 LAG_LEFT = 0.3  # chosen: half of it is as good, with none v is too sure in a tail wind (test_wind_from_all_sides)
 LEAST_REJECTIONS = 5  # chosen: a second of a 5 Hz receiver; one refusal alone is none (test_judges)
 SOON_S = 1.0  # with 7 s a flow of the wrong sign carried the vehicle 84 m off, so 10 to 15 (flownav faults)
+# chosen: flow drifts by less than 1 m in it (measured.md), and a receiver that is off for so long is not the better one
+JUMPED_S = 60.0
+LEAPT_RATIO = 4.0  # twice the gate: chosen; what a flow of the wrong sign leads away creeps out of it
+MOMENT_S = 1.5  # chosen: seven fixes of 5 Hz, in which flow and accelerometer cannot lose the way
 UNKNOWN_PAD_M = 100.0  # as good as unknown: the tie to the vehicle that follows tells it
 LEAST_PAD_VARIANCE_M2 = 1e-6  # chosen: 1 mm, so that a tie is never exact
 
+with_fused = replacing(RejectionMemory, "fused_s")
 with_reset = replacing(GpsMemory, "told_s", "moved_n_m", "moved_e_m")
 
 
@@ -138,17 +144,25 @@ def smooth_force(steady: SteadyForce) -> Force:
 # -- a fix that is refused ------------------------------------------------------------------------------------
 @equation
 def judge_rejections(
-    refused: bool, soon: bool, t_s: float, m: RejectionMemory, s: GpsSettings
+    ratio: float, position: bool, doubted: bool, t_s: float, m: RejectionMemory, s: GpsSettings, seen: bool = False
 ) -> tuple[bool, RejectionMemory]:
     """Whether GPS has been refused for a state so often and so long that the filter is wrong, and the count.
 
-    soon: it is a velocity, or the flow that else would hold the filter is doubted too. Then SOON_S is long enough.
+    ratio: its test ratio where it is refused, else 0. position: or else it is a velocity, for which SOON_S is long
+    enough, as it is where flow, which else would hold the filter, is doubted. seen: flow that nobody doubts, or along
+    down the range, has carried the state since GPS was fused last. If that was a moment before the first refusal, it is
+    GPS that jumped: for JUMPED_S it is not followed. A velocity must have leapt out of its gate for that: a flow of the
+    wrong sign leads one away, too.
     """
-    since_s = m.since_s if m.times > 0.0 else t_s
+    refused = ratio > 1.0
+    first = not m.times > 0.0
+    since_s = t_s if first else m.since_s
+    leapt = (1.0 if ratio > LEAPT_RATIO else 0.0) if first else m.leapt
     count = m.times + 1.0
-    patience_s = smaller(s.gps_reset_s, SOON_S) if soon else s.gps_reset_s
+    jumped = seen and since_s - m.fused_s <= MOMENT_S and (position or leapt > 0.0)
+    patience_s = JUMPED_S if jumped else (s.gps_reset_s if position and not doubted else smaller(s.gps_reset_s, SOON_S))
     reset = refused and count >= LEAST_REJECTIONS and t_s - since_s >= patience_s
-    return reset, RejectionMemory(count if refused and not reset else 0.0, since_s)
+    return reset, RejectionMemory(count if refused and not reset else 0.0, since_s, m.fused_s, leapt)
 
 
 @equation
@@ -181,7 +195,7 @@ class FixFate(NamedTuple):
 
 @on_lanes
 def judge_fate(
-    tested: Tested, reading: Reading, along: AlongAxis, flow: FlowMemory, memory: FixMemory,
+    tested: Tested, reading: Reading, along: AlongAxis, flow: FlowMemory, ranged: RangeMemory, memory: FixMemory,
     *, t_s: float, place: int, s: GpsSettings,
 ) -> FixFate:  # fmt: skip
     """After the test: where GPS has been refused again and again for a state, the filter is wrong: it goes to GPS.
@@ -194,8 +208,12 @@ def judge_fate(
     value, _ = component_of(reading, axis)
     heard = reading.arrived > 0.0
     doubted = flow.doubted > 0.0 or bool(np.isfinite(flow.wrong_s))
-    refused = tested.reason == INNOVATION_GATE and gate_ratio(tested, s.gate_sigma) > 1.0
-    reset, after = judge_rejections(refused, doubted or not position, t_s, m, s)
+    ratio = gate_ratio(tested, s.gate_sigma) if tested.reason == INNOVATION_GATE else 0.0
+    flowed = not doubted and t_s - flow.taken_s <= MOMENT_S
+    above = not np.isfinite(ranged.refused_s) and t_s - ranged.taken_s <= MOMENT_S
+    seen = above if axis == 2 else flowed
+    reset, after = judge_rejections(ratio, position, doubted, t_s, m, s, seen)
+    after = with_fused(after, fused_s=t_s) if tested.reason == FUSED else after
     goes = heard and reset
     by = value - (along.position_m if position else along.velocity_m_s)
     moved = by if goes and position else 0.0  # whether GPS jumped or the filter was wrong, nobody knows

@@ -7,7 +7,7 @@ import numpy as np
 from flownav.core.compile import Lanes, Work, cos, equation, procedure, replacing, smaller
 from flownav.estimation.hypotheses import RANGE_OFFSET
 from flownav.estimation.laws.height import range_along_boresight
-from flownav.estimation.states import GROUND
+from flownav.estimation.states import GROUND, POSITION
 from flownav.navigation.motion_records import ImuMemory
 from flownav.navigation.offers import conclude, fuse_offered, weigh_strays
 from flownav.navigation.packed import load_height_settings
@@ -34,7 +34,7 @@ from flownav.navigation.records import (
 )
 from flownav.navigation.tape import GROUND_FOUND, GROUND_RESET, RANGE_STUCK, Output
 from flownav.navigation.told import HeightSettings
-from flownav.navigation.trust import OF_RANGE, STRAY_SHARE, follow_noise, watch_whiteness
+from flownav.navigation.trust import OF_RANGE, STRAY_SHARE, creeps, follow_noise, watch_whiteness
 from flownav.navigation.verdicts import (
     NO_EVENT,
     NO_RESET,
@@ -43,6 +43,7 @@ from flownav.navigation.verdicts import (
     Event,
     Fate,
     Height,
+    Left,
     Offer,
     Reset,
     Sign,
@@ -55,10 +56,7 @@ from flownav.navigation.vibration import doubted_imu
 # Refused so long, a range that alone tells the height is believed, not the accelerometer: chosen; at once, a lone echo
 # would make the accelerometer doubted.
 DOUBTING_S = 0.05
-# Innovations lean to one side before a range creeps out of its gate: where they are white, their exponential mean has a
-# standard deviation of 0.58 and lies beyond CREPT_SIGMAS once in a hundred. The second refused is within JUMPED gates,
-# not the first: a sonar over grass (outdoor-3) leaves its gate for one reading.
-LEANING_SHARE, CREPT_SIGMAS, JUMPED = 0.5, 1.5, 2.0
+LEANING_SHARE = 0.5  # of a range that is fused in the mean of those before it
 AGREEMENT_M, AGREEMENT_SHARE = 0.2, 0.05  # ranges of one ground agree so far: chosen, not measured
 LEAST_AGREEING = 3.0  # one echo finds no ground; a roof of 1.2 m is found after 1.45 s (test_navigation_safeguards)
 STILL_S = 1.0  # a range that repeats itself so long while a ground is sought is of a vehicle that stands: not measured
@@ -74,7 +72,8 @@ UNAIDED_TRAVEL_RATIO = 5.0  # times the travel, where nothing else tells the hei
 with_value = replacing(RangeMemory, "last_m", "same_s", "down_m")
 with_report = replacing(RangeMemory, "said_s")
 with_taken = replacing(RangeMemory, "taken_s", "refused_s")
-with_sigmas = replacing(RangeMemory, "sigmas")
+with_sigmas = replacing(RangeMemory, "sigmas", "off_m")
+with_test = replacing(RangeMemory, "tested_s", "contradiction_m", "before_m")
 with_refusal = replacing(RangeMemory, "refused_s", "doubted")
 without_candidate = replacing(GroundMemory, "candidate_m", "since_s", "first_m", "agreeing", "varied")
 
@@ -239,14 +238,8 @@ class Refusal(NamedTuple):
     doubted: Event
     reset: Reset
     found: Event
+    left: Left
     again: bool
-
-
-@equation
-def creeps(tested: Tested, m: RangeMemory, gate_sigma: float) -> bool:
-    """Whether a range has left its gate step by step: the motion errs then, where a step of the ground jumps out."""
-    sigmas = tested.innovation / np.sqrt(tested.total)
-    return m.sigmas * sigmas > 0.0 and abs(m.sigmas) > CREPT_SIGMAS and abs(sigmas) < JUMPED * gate_sigma
 
 
 @on_lanes
@@ -259,6 +252,7 @@ def judge_refusal(
     The accelerometer is doubted where the range crept out of its gate and stays out, or alone tells the height.
     A streak of refusals ends where the sensor says something else. The ground is found anew where ranges agree on it
     for long, and where they do not, its candidate is followed; a vehicle that stands stands on the ground it has.
+    Whether it was a step of the ground or the height was wrong, nobody knows: by so much the height may be off.
     """
     m, echo, g = memory
     fused, refused = tested.reason == FUSED, tested.reason == INNOVATION_GATE
@@ -268,7 +262,7 @@ def judge_refusal(
     lasting_s = t_s - since_s
     alone = t_s - aid.height_s > s.height_hold_s
     second = refused and np.isfinite(m.refused_s) and doubted_before == 0.0 and echo.stray <= STRAY_SHARE
-    crept = second and creeps(tested, m, s.gate_sigma)
+    crept = second and creeps(tested, t_s, m, s.gate_sigma)
     long = alone and doubted_before == 0.0 and lasting_s >= DOUBTING_S
     doubts = refused and not strays and (long or crept)
     by_m = tested.innovation if doubts else 0.0
@@ -284,7 +278,16 @@ def judge_refusal(
     followed = judge_ground(below_m, reading.value_0, t_s, False, g)[1]
     after = with_taken(m, taken_s=t_s if fused else m.taken_s, refused_s=np.nan) if ends else m
     leaning = m.sigmas + LEANING_SHARE * (tested.innovation / np.sqrt(tested.total) - m.sigmas)
-    after = with_sigmas(after, sigmas=leaning if fused else m.sigmas)
+    after = with_sigmas(
+        after, sigmas=leaning if fused else m.sigmas, off_m=tested.innovation if fused else m.off_m
+    )  # fmt: skip
+    tests = fused or refused
+    after = with_test(
+        after,
+        tested_s=t_s if tests else m.tested_s,
+        contradiction_m=tested.innovation if tests else m.contradiction_m,
+        before_m=m.contradiction_m if tests else m.before_m,
+    )
     after = with_refusal(after, refused_s=since_s, doubted=1.0 if doubts else doubted_before) if refused else after
     return Refusal(
         Fate(FUSED if again else SILENT),
@@ -298,6 +301,7 @@ def judge_refusal(
         doubt_event,
         sought.reset if again else NO_RESET,
         sought.event if again else NO_EVENT,
+        Left(POSITION + 2, -tested.innovation * height.upright if again else 0.0),
         again,
     )
 

@@ -20,13 +20,13 @@ from flownav.navigation.tape import IMU_LOST
 from flownav.navigation.told import ImuSettings
 from flownav.navigation.trust import AccelFactors
 from flownav.navigation.verdicts import AppliedMotion, Event, Force, MotionNoise, on_lanes
-from flownav.navigation.vibration import followed_vibration, with_reading
+from flownav.navigation.vibration import followed_accel_power, followed_gyro_power, followed_vibration, with_reading
 
 LEAST_STEP_S = 0.002  # chosen: half a period at 250 Hz; what is owed over less would be an acceleration of its own
 SWING_S = 0.3  # chosen: 0.6 is as good, with none all three velocities are too sure (test_wind_from_all_sides)
 STEADY_S = 0.1  # chosen: of vibration at 24 Hz (the shipped rotor) a fifteenth is left
 BEYOND_ANY_UNIT = 1e4  # m/s2 and rad/s: chosen, five times what the widest shock sensor of an autopilot reads (200 g)
-with_motion = replacing(ImuMemory, "vibration", "gap")
+with_motion = replacing(ImuMemory, "vibration", "gyro_power", "accel_power", "gap")
 Motion = tuple[float, float, float, float, float, float]  # body rate [rad/s] and specific force [m/s2], body FRD
 
 
@@ -68,20 +68,25 @@ def without_tones(motion: Motion, m: ToneMemory) -> Motion:
 
 
 @equation
-def told_noise(least: float, power: float, s: ImuSettings) -> float:
-    """Density of the accelerometer's noise [m/s2/sqrt(Hz)]: as told, or as what is left beside the tones shows."""
-    return larger(least, np.sqrt(power)) if is_notched(s) else least
+def told_noise(least: float, whole: float, left: float, s: ImuSettings) -> float:
+    """Density of the accelerometer's noise [m/s2/sqrt(Hz)]: as told, or more where its readings show more: their whole
+    power, or what the notches leave of it.
+    """
+    return larger(least, np.sqrt(left if is_notched(s) else whole))
 
 
 @equation
-def turning_noise(turn_rad_s: float, s: ImuSettings) -> float:
-    """Density squared of the gyro's noise [rad2/s]: what is told, and what turning about body down makes of its scale.
+def turning_noise(turn_rad_s: float, power: float, s: ImuSettings) -> float:
+    """Density squared of the gyro's noise [rad2/s]: what is told, or more where its readings show more (power), and
+    what turning about body down makes of its scale. A rotor's tone, which comes back within its
+    period, turns nothing: what it shows is not counted.
 
     An error of scale or alignment is a lasting share of what is turned, and the tilt that it makes of a turn comes back
     as the heading does: white noise of the time that a swing lasts.
     """
     scale = s.gyro_scale_sigma * turn_rad_s
-    return s.gyro_noise_rad_s_rt_hz * s.gyro_noise_rad_s_rt_hz + SWING_S * scale * scale
+    seen = power - s.gyro_tones_rad_s_rt_hz * s.gyro_tones_rad_s_rt_hz
+    return larger(s.gyro_noise_rad_s_rt_hz * s.gyro_noise_rad_s_rt_hz, seen) + SWING_S * scale * scale
 
 
 @equation
@@ -167,11 +172,13 @@ def judge_motion(
     y = paid(between[4], held[4], spent.accel_y, owed.accel_y, step_s, period_s, now, moving)
     z = paid(between[5], held[5], spent.accel_z, owed.accel_z, step_s, period_s, now, moving)
     least_down = s.accel_noise_m_s2_rt_hz * s.accel_noise_down_share
-    told = told_noise(s.accel_noise_m_s2_rt_hz, tones.noise_power, s)
-    told_down = told_noise(least_down, tones.noise_power, s)
+    told = told_noise(s.accel_noise_m_s2_rt_hz, m.accel_power, tones.noise_power, s)
+    told_down = told_noise(least_down, m.accel_power, tones.noise_power, s)
     accel = doubt.level * told if moving else s.coasting_accel_m_s2_rt_hz
     accel_down = larger(doubt.level, doubt.down) * told_down if moving else s.coasting_accel_m_s2_rt_hz
-    gyro = turning_noise(r.value, s) if moving else s.coasting_rate_rad_s_rt_hz * s.coasting_rate_rad_s_rt_hz
+    gyro = (
+        turning_noise(r.value, m.gyro_power, s) if moving else s.coasting_rate_rad_s_rt_hz * s.coasting_rate_rad_s_rt_hz
+    )
     return StepMotion(
         MotionStep(1.0 if moving else 0.0),
         AppliedMotion(p.value, q.value, r.value, x.value, y.value, z.value),
@@ -179,6 +186,8 @@ def judge_motion(
             with_motion(
                 m,
                 vibration=followed_vibration(reading, m, period_s) if now and fresh else m.vibration,
+                accel_power=followed_accel_power(reading, m, period_s) if now and fresh else m.accel_power,
+                gyro_power=followed_gyro_power(reading, m, period_s) if now and fresh else m.gyro_power,
                 gap=1.0 if step_s > 0.0 and started and not moving else m.gap,
             ),
             SpentMotion(p.spent, q.spent, r.spent, x.spent, y.spent, z.spent),

@@ -8,7 +8,6 @@ import numpy as np
 
 from flownav.core.compile import Lanes, Layout, Work, equation
 from flownav.core.measurement import Array, Sensor
-from flownav.estimation.hypotheses import COUNT as FAULTS_FOLLOWED
 from flownav.estimation.named import Attitude, PositionNed, VelocityNed
 from flownav.estimation.states import (
     CONSIDERS,
@@ -44,6 +43,7 @@ from flownav.navigation.records import (
     FlowInnovation,
     FlowMemory,
     FlowSignMemory,
+    FlowSum,
     GpsMemory,
     GroundMemory,
     HeadingMemory,
@@ -90,6 +90,7 @@ MEMORY.keep(BaroMemory)
 MEMORY.keep(GpsMemory)
 MEMORY.keep(LevelMemory)
 MEMORY.keep(PadMemory)
+GROUNDED = MEMORY.row(StandMemory, "grounded")
 PAD_KNOWN = MEMORY.row(PadMemory, "known")
 HEADING_SOUGHT = MEMORY.row(HeadingMemory, "sought")
 # what becomes of the component that is offered
@@ -101,7 +102,7 @@ RANGE_MISSING = MEMORY.row(Look, "unranged")
 SCALE_DOUBT = MEMORY.keep(ScaleDoubt)
 MEMORY.keep(SteadyForce)
 MEMORY.keep(DriftMemory)
-for _record in (MotionStep, SpentMotion, OwedMotion, ToneMemory, FlowSignMemory, SuspicionMemory):
+for _record in (MotionStep, SpentMotion, OwedMotion, ToneMemory, FlowSignMemory, SuspicionMemory, FlowSum):
     MEMORY.keep(_record)
 PROTECTION = MEMORY.keep(Levels)  # horizontal and vertical
 SUSPECTED = MEMORY.row(SuspicionMemory, "suspected")
@@ -110,6 +111,7 @@ CLOCK = MEMORY.take(1)  # the instant that the filter has reached [s]
 LAST_ESTIMATE = MEMORY.take(1)  # the last estimate's [s]
 ERRORS_CLOCK = MEMORY.take(1)  # the instant that the Gauss-Markov errors have reached [s]
 STILL_CLOCK = MEMORY.take(1)  # the end of the last window [s]
+HOLD_CLOCK = MEMORY.take(1)  # when a stand was last held to be one [s]
 DRIFT_SINCE = MEMORY.take(1)  # from when a drift of GPS is sought [s]
 LEVEL_READ = MEMORY.take(1)  # when an external attitude was last taken for level [s]
 NEWEST_OF_SENSOR = MEMORY.take(max(Sensor) + 1)  # of each sensor, the newest instant [s]
@@ -130,12 +132,14 @@ load_suspicion, store_suspicion = MEMORY.access(SuspicionMemory)
 _, store_levels = MEMORY.access(Levels)
 load_whiteness, _ = MEMORY.access(WhitenessMemory)
 load_look, _ = MEMORY.access(Look)
+load_range, _ = MEMORY.access(RangeMemory)
 
 _FRESH: dict[int, tuple[float, ...]] = {
     QUATERNION: (1.0, 0.0, 0.0, 0.0),
     STILL_CLOCK: (-np.inf,),
+    HOLD_CLOCK: (-np.inf,),
     CONSIDERS: (1.0,),
-    HYPOTHESES: (FAULTS_FOLLOWED,),
+    HYPOTHESES: (MOST_HYPOTHESES,),
     SHARE: (1.0,) * MOST_HYPOTHESES,
     DRIFT_SINCE: (-np.inf,),
     CLOCK: (-np.inf,),

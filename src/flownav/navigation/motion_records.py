@@ -9,7 +9,10 @@ from typing import NamedTuple
 
 class ImuMemory(NamedTuple):
     """The newest reading (gyro [rad/s], specific force [m/s2], body FRD) and its time; the mean square of its jumps
-    [m2/s4]; how far the accelerometer is doubted along body down [m/s2]; gap: 1 after a stretch without readings.
+    [m2/s4]; how far the accelerometer is doubted along body down [m/s2]; gap: 1 after a stretch without readings;
+    shaken_most: the greatest mean square of its jumps by which its biases were doubted, fading [m2/s4]; the gyro's
+    change from the reading before [rad/s], the accelerometer's along its level axes [m/s2], and the power densities of
+    their noise [(rad/s)^2/Hz, (m/s2)^2/Hz].
     """
 
     read_s: float = -inf
@@ -22,15 +25,29 @@ class ImuMemory(NamedTuple):
     vibration: float = 0.0
     doubt_m_s2: float = 0.0
     gap: float = 0.0
+    shaken_most: float = 0.0
+    change_p: float = 0.0
+    change_q: float = 0.0
+    change_r: float = 0.0
+    change_x: float = 0.0
+    change_y: float = 0.0
+    gyro_power: float = 0.0
+    accel_power: float = 0.0
 
 
 class StandMemory(NamedTuple):
     """does: what the vehicle did in the last window, `still.MOVES`, SHAKEN or RESTS; contact_m: the range when it
-    rested last, NaN where it has not.
+    rested last, NaN where it has not; last_m: the last range of all, NaN before the first; windows: how many, one
+    after the other, in which it did that; grounded: 1 while it stands, and until the first window tells; gps_m_s: the
+    fastest level velocity by GPS in the last window.
     """
 
     does: float = 0.0
     contact_m: float = nan
+    last_m: float = nan
+    windows: float = 0.0
+    grounded: float = 1.0
+    gps_m_s: float = 0.0
 
 
 class BridgeMemory(NamedTuple):
@@ -91,12 +108,16 @@ class ImuWindow(NamedTuple):
 
 
 class SeenWindow(NamedTuple):
-    """What else was read in a window: lowest and highest range [m] (the highest below 0: none), sums of the flow's
-    velocity [m/s] and of how many, and the fastest level velocity by GPS [m/s].
+    """What else was read in a window: lowest and highest range [m] (the highest below 0: none), the newest, how many,
+    and the sum of squares of what changes between two [m2]; sums of the flow's velocity [m/s] and of how many, and the
+    fastest level velocity by GPS [m/s].
     """
 
     range_low_m: float = 1e9
     range_high_m: float = -1.0
+    range_m: float = 0.0
+    ranges: float = 0.0
+    range_jumps: float = 0.0
     flow_u_m_s: float = 0.0
     flow_v_m_s: float = 0.0
     flows: float = 0.0

@@ -120,7 +120,7 @@ def gate_ratio(tested: Tested, gate_sigma: float) -> float:
 
 @on_lanes
 def compare_level(tested: Tested, m: LevelMemory, *, axis: int, gate_sigma: float) -> LevelMemory:
-    """The larger test ratio of north and east, once both are compared; 0 where neither can be offered."""
+    """The largest test ratio of the components of a place, once all are compared; 0 where none can be offered."""
     before = m.ratio if axis > 0 else 0.0
     ratio = gate_ratio(tested, gate_sigma)
     return LevelMemory(ratio if tested.reason == FUSED and ratio > before else before)

@@ -12,7 +12,7 @@ from flownav.estimation.laws.still import pad_below, position_itself, velocity_i
 from flownav.estimation.named import Attitude, PositionNed, VelocityNed, rotation_by
 from flownav.estimation.states import MEASURED, PAD, STATE
 from flownav.navigation.memory import MEMORY
-from flownav.navigation.motion_records import ImuMemory
+from flownav.navigation.motion_records import ImuMemory, SeenWindow, StandMemory
 from flownav.navigation.offers import compare_level, conclude, fuse_offered, judged_whole, note_aid, note_height
 from flownav.navigation.packed import load_place_settings
 from flownav.navigation.reasons import (
@@ -28,11 +28,12 @@ from flownav.navigation.records import AidMemory, LevelMemory, PadMemory, Readin
 from flownav.navigation.tape import PAD_FOUND, Output
 from flownav.navigation.told import PlaceSettings
 from flownav.navigation.verdicts import UNKNOWN_M, Event, Fate, Offer, Reset, on_lanes
+from flownav.navigation.windows import RESTING_FLOW_M_S, RESTING_GPS_M_S, flow_speed
 
 LEAST_PAD_DISTANCE_M = 0.05  # chosen: no camera on board is so near its pad; halved it fails test_judges
-# Refused components of fixes, no whole fix fused between: chosen. Without it a first fix of something else stays the
-# pad (test_a_pad_first_seen_where_there_is_none_is_found_where_it_is; 13 of 480 approaches landed metres beside).
-MANY_STRAYS = 6.0
+# Refused fixes in a row: chosen. Without it a first fix of something else stays the pad
+# (test_a_pad_first_seen_where_there_is_none_is_found_where_it_is; 13 of 480 approaches landed metres beside).
+MANY_STRAYS = 4.0
 LEAST_WHITE_SHARE = 0.02
 ON_GROUND = 0.5  # between 0 and 1
 FLOWN_S = 5.0  # chosen: a skid switch that bounces, or a detector that has not made up its mind, is no flight
@@ -42,7 +43,11 @@ CARRIED_M = 0.1  # chosen, not measured; 0.05 m stays and 0.15 m goes along (tes
 # has seen it
 NEVER_STOOD, STOOD_ON, LEFT, SEEN = -1.0, 1.0, 2.0, 3.0
 
+# Above the ground of any vehicle that stands on it: chosen; `windows` tells how fast one is that does.
+ALOFT_M = 1.0
+
 with_landed = replacing(AidMemory, "landed")
+with_landing = replacing(Reading, "value_0")
 with_known = replacing(PadMemory, "known", "aloft_s")
 
 
@@ -175,28 +180,29 @@ class PadOffer(NamedTuple):
 
 @on_lanes
 def judge_sight(
-    reading: Reading, start: StartMemory, velocity: VelocityNed, m: ImuMemory, *, component: int, s: PlaceSettings
-) -> PadOffer:
-    """One component of a pad fix."""
+    reading: Reading, start: StartMemory, velocity: VelocityNed, m: ImuMemory, fix: LevelMemory,
+    *, component: int, alone: bool, s: PlaceSettings,
+) -> PadOffer:  # fmt: skip
+    """One component of a pad fix. All three are judged together: what is not the pad may lie in line with it along one
+    of them, and there its lever would turn the heading. alone: whatever the others say.
+    """
     reason, fixed = judge_pad(reading, component, start.started, s)
     variance = fixed + late_variance(velocity, m, reading.value_2, component, s)
     value, _ = component_of(reading, component)
-    return PadOffer(Offer(value, variance, reason), Sight(reading.value_0, reading.value_1, reading.value_2))
+    judged = reason if alone else judged_whole(reason, 0, fix)
+    return PadOffer(Offer(value, variance, judged), Sight(reading.value_0, reading.value_1, reading.value_2))
 
 
 @on_lanes
-def count_refusals(fate: Fate, m: PadMemory, *, component: int) -> PadMemory:
+def count_refusals(fate: Fate, m: PadMemory) -> PadMemory:
     """A pad that the camera sees elsewhere, fix after fix, is not where it was first seen: the next fix finds it anew.
 
     The first fix may have been of something else, and its place, once believed, would refuse all true ones.
     """
     refused = fate.reason == INNOVATION_GATE
-    whole = component == 1 and fate.reason == FUSED and m.first_refused == 0.0
-    refusals = m.refusals + 1.0 if refused else (0.0 if whole else m.refusals)
+    refusals = m.refusals + 1.0 if refused else (0.0 if fate.reason == FUSED else m.refusals)
     astray = refusals >= MANY_STRAYS
-    return PadMemory(
-        LEFT if astray else m.known, 0.0 if astray else refusals, 1.0 if component == 0 and refused else 0.0, m.aloft_s
-    )
+    return PadMemory(LEFT if astray else m.known, 0.0 if astray else refusals, m.aloft_s)
 
 
 @procedure
@@ -205,16 +211,40 @@ def take_pad(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Outp
     s = load_place_settings(p)
     find_pad(work, lanes, t_s, s, o)
     for component in range(3):
-        judge_sight(work, lanes, component, s)
-        pad_fix(work, lanes, component, s.pad_below_m, s.pad_forward_m, s.pad_right_m)
+        see_pad(work, lanes, component, True, s)
+        expect(work, lanes, states_of(lanes), True)
+        compare_level(work, lanes, component, s.gate_sigma)
+    for component in range(3):
+        see_pad(work, lanes, component, False, s)
         conclude(work, lanes, t_s, sensor, component, s.gate_sigma, o)
         note_height(work, lanes, t_s)
         note_aid(work, lanes, t_s, o)
-        if component < 2:
-            count_refusals(work, lanes, component)
+        if component == 0:
+            count_refusals(work, lanes)
+
+
+@procedure
+def see_pad(work: Work, lanes: Lanes, component: int, alone: bool, s: PlaceSettings) -> None:
+    """One component of a pad fix, judged and put before its law."""
+    judge_sight(work, lanes, component, alone, s)
+    pad_fix(work, lanes, component, s.pad_below_m, s.pad_forward_m, s.pad_right_m)
 
 
 # -- at rest ------------------------------------------------------------------------------------------------
+@equation
+def is_aloft(seen: SeenWindow, m: StandMemory) -> bool:
+    """Whether a vehicle flies that is said to have landed: a range, a receiver or the flow says so."""
+    range_m = seen.range_high_m if seen.range_high_m >= 0.0 else m.last_m
+    flow_m_s = flow_speed(seen) if range_m >= 0.0 else 0.0  # over a height that nobody told it is no speed
+    return range_m > ALOFT_M or larger(seen.gps_m_s, m.gps_m_s) >= RESTING_GPS_M_S or flow_m_s >= RESTING_FLOW_M_S
+
+
+@on_lanes
+def disbelieve_landed(reading: Reading, seen: SeenWindow, m: StandMemory) -> Reading:
+    """One that flies has not landed, whatever is said."""
+    return with_landing(reading, value_0=0.0 if is_aloft(seen, m) else reading.value_0)
+
+
 @on_lanes
 def note_landed(reading: Reading, aid: AidMemory) -> AidMemory:
     """Whether the vehicle is on the ground, by the newest that was said."""
@@ -222,10 +252,13 @@ def note_landed(reading: Reading, aid: AidMemory) -> AidMemory:
 
 
 @on_lanes
-def judge_landed(reading: Reading, start: StartMemory, *, variance: float) -> Offer:
-    """No velocity, on the ground; in flight, nothing."""
+def judge_landed(
+    reading: Reading, start: StartMemory, seen: SeenWindow, m: StandMemory, *, variance: float
+) -> Offer:  # fmt: skip
+    """No velocity, on the ground; in flight, nothing. What contradicts it refuses it."""
     reason = usable(reading, reading.value_0, variance, start.started)
-    return Offer(0.0, variance, reason if reading.value_0 > ON_GROUND else SILENT)
+    claimed = INNOVATION_GATE if reason == FUSED and is_aloft(seen, m) else reason
+    return Offer(0.0, variance, claimed if reading.value_0 > ON_GROUND else SILENT)
 
 
 class Standing(NamedTuple):
@@ -270,14 +303,17 @@ def tie_to_pad(reading: Reading, m: PadMemory) -> Offer:
 
 @procedure
 def take_landed(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
-    """On the ground: no velocity, and before a flight the pad is where the vehicle stands. In flight, nothing."""
+    """On the ground: no velocity, and before a flight the pad is where the vehicle stands. In flight, nothing; nor
+    where a range, a receiver or the flow says that it flies: whoever says "landed" is one witness among them.
+    """
     s = load_place_settings(p)
-    note_landed(work, lanes)
     for axis in range(3):
         judge_landed(work, lanes, s.still_sigma_m_s * s.still_sigma_m_s)
         velocity_itself(work, lanes, axis)
         conclude(work, lanes, t_s, sensor, axis, s.gate_sigma, o)
         note_aid(work, lanes, t_s, o)
+    disbelieve_landed(work, lanes)
+    note_landed(work, lanes)
     if stand_on_pad(work, lanes, t_s, o):
         for axis in range(3):
             tie_to_pad(work, lanes)

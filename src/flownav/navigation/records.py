@@ -70,7 +70,8 @@ class RangeMemory(NamedTuple):
     """taken_s: of the last range that was fused; refused_s: since when they are refused; last_m and same_s: the last
     value and since when it repeats; down_m: where the vehicle was then; said_s: of the repetition that was reported;
     doubted: 1 once the accelerometer was doubted for it; sigmas: exponential mean of the innovations that were
-    fused, in standard deviations.
+    fused, in standard deviations; off_m: the last of them; tested_s, contradiction_m: of the last that was tested,
+    fused or refused; before_m: contradiction of the one before.
     """
 
     taken_s: float = -inf
@@ -81,6 +82,10 @@ class RangeMemory(NamedTuple):
     said_s: float = nan
     doubted: float = 0.0
     sigmas: float = 0.0
+    off_m: float = 0.0
+    tested_s: float = -inf
+    contradiction_m: float = 0.0
+    before_m: float = 0.0
 
 
 class EchoMemory(NamedTuple):
@@ -134,6 +139,22 @@ class FlowMemory(NamedTuple):
     usual: float = 0.0
 
 
+class FlowSum(NamedTuple):
+    """Looks of an angular flow that are too short to be fused alone: when the newest ended [s], for how long they
+    looked together [s], and the sums of their values and of their quality, each times its length.
+    """
+
+    heard_s: float = -inf
+    looked_s: float = 0.0
+    x: float = 0.0
+    y: float = 0.0
+    own_x: float = 0.0
+    own_y: float = 0.0
+    imu_x: float = 0.0
+    imu_y: float = 0.0
+    quality: float = 0.0
+
+
 class FlowInnovation(NamedTuple):
     """A component's innovation at the flow reading before [rad/s or m/s]."""
 
@@ -143,7 +164,8 @@ class FlowInnovation(NamedTuple):
 class Look(NamedTuple):
     """What the flow reading at hand saw: the vehicle's turning [rad/s]; the range from the lens to the ground along the
     boresight by the filter [m], and known: 1 where that is well known; R_33; unranged: 1 where no range tells the
-    height of the flow now: none lately, or a disputed one, or strays; and the verdict on the whole reading (`reasons`).
+    height of the flow now: none lately, or a disputed one, or strays; by how much the newest range disputes that height
+    [m]; and the verdict on the whole reading (`reasons`).
     """
 
     turning_x: float = 0.0
@@ -152,6 +174,7 @@ class Look(NamedTuple):
     known: float = 0.0
     upright: float = 0.0
     unranged: float = 0.0
+    disputed_m: float = 0.0
     reason: float = 0.0
 
 
@@ -168,11 +191,14 @@ class HeadingMemory(NamedTuple):
 
 
 class NoiseMemory(NamedTuple):
-    """factor: a component's noise over what is said of it [variance]; its innovation before, and when that was [s]."""
+    """factor: a component's noise over what is said of it [variance]; its innovation before, when that was [s], and how
+    many have taught it.
+    """
 
     factor: float = 1.0
     before: float = 0.0
     heard_s: float = -inf
+    readings: float = 0.0
 
 
 class WhitenessMemory(NamedTuple):
@@ -191,7 +217,7 @@ class WhitenessMemory(NamedTuple):
 
 
 class LevelMemory(NamedTuple):
-    """ratio: the larger test ratio of north and east of the place, or velocity, at hand."""
+    """ratio: the largest test ratio of the components that are judged together: of a place, a velocity or a pad fix."""
 
     ratio: float = 0.0
 
@@ -208,21 +234,23 @@ class GpsMemory(NamedTuple):
 
 class PadMemory(NamedTuple):
     """known: 0 where the pad is not, or how it is: NEVER_STOOD, STOOD_ON, LEFT, SEEN of `place`; refusals: of fixes in
-    a row, by component; first_refused: 1 where the first component of the fix at hand was; aloft_s: since when one that
-    stood nowhere is said to fly.
+    a row; aloft_s: since when one that stood nowhere is said to fly.
     """
 
     known: float = 0.0
     refusals: float = 0.0
-    first_refused: float = 0.0
     aloft_s: float = inf
 
 
 class RejectionMemory(NamedTuple):
-    """How often GPS was refused for one state, one after the other, and since when."""
+    """How often GPS was refused for one state, one after the other, and since when; when it was fused last; leapt: 1
+    where the first of them was far beyond the gate.
+    """
 
     times: float = 0.0
     since_s: float = 0.0
+    fused_s: float = -inf
+    leapt: float = 0.0
 
 
 class FlowSignMemory(NamedTuple):

@@ -121,10 +121,19 @@ def innovation_row(
 
 # -- the estimate ------------------------------------------------------------------------------------------
 @equation
+def of_unknown_scale(work: Work, lanes: Lanes, state: int, lane: int) -> float:
+    """What a flow scale that nothing tells makes of a level position [m], from the start on, or velocity [m/s]: one
+    standard deviation.
+    """
+    unknown: float = work[SCALE_DOUBT * len(lanes) + lane] * work[(STATE + state) * len(lanes) + lane]
+    return unknown
+
+
+@equation
 def position_variance(work: Work, lanes: Lanes, axis: int, lane: int) -> float:
-    """Variance of position [m2]; level, with what a flow scale that nothing tells makes of the way from the start."""
-    unknown_m = work[SCALE_DOUBT * len(lanes) + lane] * work[(STATE + POSITION + axis) * len(lanes) + lane]
-    return variance_of(work, lanes, POSITION + axis, lane) + (unknown_m * unknown_m if axis < 2 else 0.0)
+    """Variance of position [m2]; level, with what a flow scale that nothing tells makes of it."""
+    unknown_m = of_unknown_scale(work, lanes, POSITION + axis, lane) if axis < 2 else 0.0
+    return variance_of(work, lanes, POSITION + axis, lane) + unknown_m * unknown_m
 
 
 @equation
@@ -150,9 +159,11 @@ def deviation_of(work: Work, lanes: Lanes, state: int, lane: int) -> float:
 
 @equation
 def body_velocity_variance(work: Work, lanes: Lanes, lane: int, north: float, east: float, down: float) -> float:
-    """e' P_vv e of one body axis e in earth NED [m2/s2]."""
+    """e' P_vv e of one body axis e in earth NED [m2/s2], with what a flow scale that nothing tells makes of it."""
     axis = (north, east, down)
-    variance = 0.0
+    unknown = north * of_unknown_scale(work, lanes, VELOCITY, lane)
+    unknown += east * of_unknown_scale(work, lanes, VELOCITY + 1, lane)
+    variance = unknown * unknown
     for j in range(3):
         for k in range(3):
             variance += axis[j] * covariance_of(work, lanes, VELOCITY + j, VELOCITY + k, lane) * axis[k]

@@ -43,10 +43,10 @@ class NavigatorSettingsFile(ParameterModel):
     """The settings as a TOML file states them; every key may be left out."""
 
     accel_noise_m_s2_rt_hz: Number = Field(
-        0.05,
+        0.1,
         gt=0,
         le=50,
-        description="accelerometer noise with vibration; PX4's 0.35 m/s2 at 8 ms is 0.03",
+        description="accelerometer noise with vibration; PX4's 0.35 m/s2 at 8 ms is 0.03, and half as much again lasts",
     )
     accel_noise_down_share: Number = Field(
         1.0, gt=0, le=10, description="of that noise, of the vertical: a rotor shakes level more than down"
@@ -56,6 +56,12 @@ class NavigatorSettingsFile(ParameterModel):
     )
     gyro_scale_sigma: Number = Field(
         0.0, ge=0, le=0.2, description="gyro's scale and alignment, one standard deviation, a share; 0: in the noise"
+    )
+    gyro_tones_rad_s_rt_hz: Number = Field(
+        0.0,
+        ge=0,
+        le=5,
+        description="what tones that turn nothing show as noise between a gyro's readings; 0: none known",
     )
     accel_walk_m_s2_rt_s: Number = Field(0.003, ge=0, le=1, description="accelerometer bias, PX4's 0.003")
     gyro_walk_rad_s_rt_s: Number = Field(1e-4, ge=0, le=0.1, description="gyro bias over minutes of warming")
@@ -79,9 +85,15 @@ class NavigatorSettingsFile(ParameterModel):
         0.5, ge=0, le=10, description="what exceeds it lets the bias walk by this share: vibration is rectified"
     )
     vibration_bias_share: Number = Field(3.0, ge=0, le=20, description="and widens its limit by this share")
+    vibration_rectified_share: Number = Field(
+        2.0,
+        ge=0,
+        le=20,
+        description="of what shakes an accelerometer, rms, what it may err by for as long as it is shaken so",
+    )
     accel_bias_sigma_m_s2: Number = Field(0.2, gt=0, le=5, description="accelerometer bias at the start: 20 mg")
     gyro_bias_sigma_rad_s: Number = Field(
-        0.01, gt=0, le=0.5, description="gyro bias at the start, as its autopilot calibrated it: 0.6 deg/s"
+        0.003, gt=0, le=0.5, description="gyro bias at the start, as its autopilot calibrated it: 0.2 deg/s"
     )
     coasting_accel_m_s2_rt_hz: Number = Field(
         3.0, gt=0, le=100, description="without an IMU: manoeuvres of 0.3 g that last 0.5 s"

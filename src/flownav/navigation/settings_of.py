@@ -6,6 +6,7 @@ in sheets and two-sided in the filter, where white noise of density N lets its i
 """
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 from flownav.core.frames import GRAVITY_M_S2
@@ -26,6 +27,7 @@ BIAS_LIMIT_SIGMAS = 3.0  # a limit leaves room for all but 3 in 1000 units; chos
 VIBRATION_MARGIN = 2.0  # chosen, not measured: what is beyond twice the stated vibration, the sheet does not know
 # slower motion is held by what aids the IMU: level velocity errs by 1.17 of what is stated with 2, by 1.02 with 4
 AIDED_HZ = 3.0
+RECTIFIED_SHARE = 0.1  # of a unit that a sheet describes: chosen; 1 is the false roll of `landing`
 NOTCHED = ("level_m_s2", "vertical_m_s2")
 # what a unit that integrates leaves out of the position; with 0.01, the default, w errs by 0.7 of what is stated at
 # `approach`, with this by 1.0
@@ -145,10 +147,8 @@ def of_inertial(sheet: InertialSheet, rotor_hz: tuple[float, float] | None = Non
     it counts by AIDED_HZ/f, and by what a notch leaves of it where there is one.
     """
     gyro, accel, rt_period_s = sheet.gyro, sheet.accelerometer, math.sqrt(sheet.period_s)
-    level_m_s2, down_m_s2 = (_shaken(sheet, part, rotor_hz) for part in ("level_m_s2", "vertical_m_s2"))
-    jumping_m_s2 = max(
-        _shaken(sheet, "level_m_s2", rotor_hz, whole=True), _shaken(sheet, "vertical_m_s2", rotor_hz, whole=True)
-    )
+    level_m_s2, down_m_s2 = (_shaken(sheet, part, rotor_hz) for part in NOTCHED)
+    jumping_m_s2 = max(_shaken(sheet, part, rotor_hz, lambda hz: 1.0) for part in NOTCHED)
     turning_rad_s = math.radians(_shaken(sheet, "tilt_deg_s", rotor_hz))
     mg = 1e-3 * GRAVITY_M_S2
     accel_white = 1e-3 * mg * accel.density_ug_rthz / math.sqrt(2.0)
@@ -162,6 +162,7 @@ def of_inertial(sheet: InertialSheet, rotor_hz: tuple[float, float] | None = Non
         "accel_noise_down_share": down / level,
         "gyro_noise_rad_s_rt_hz": math.hypot(gyro_white, turning_rad_s * rt_period_s),
         "gyro_scale_sigma": _scale_error(gyro),
+        "gyro_tones_rad_s_rt_hz": 0.0 if rotor_hz is None else _tones_as_noise(sheet, rotor_hz),
         "accel_walk_m_s2_rt_s": mg * accel.walk_mg_rts,
         "gyro_walk_rad_s_rt_s": math.radians(gyro.walk_deg_s_rts),
         "accel_bias_sigma_m_s2": max(accel_bias, 1e-4),
@@ -169,6 +170,7 @@ def of_inertial(sheet: InertialSheet, rotor_hz: tuple[float, float] | None = Non
         "accel_bias_limit_m_s2": max(float(usual.accel_bias_limit_m_s2), BIAS_LIMIT_SIGMAS * accel_bias),
         "gyro_bias_limit_rad_s": max(float(usual.gyro_bias_limit_rad_s), BIAS_LIMIT_SIGMAS * gyro_bias),
         "vibration_free_m_s2": max(float(usual.vibration_free_m_s2), VIBRATION_MARGIN * jumping_m_s2),
+        "vibration_rectified_share": RECTIFIED_SHARE,
         "imu_integrates": 1.0,
         "position_walk_m_rt_s": INTEGRATED_M_RT_S,
     } | _notches(sheet, rotor_hz)
@@ -194,20 +196,32 @@ def _notches(sheet: InertialSheet, rotor_hz: tuple[float, float] | None) -> Keys
     }
 
 
-def _shaken(sheet: InertialSheet, part: str, rotor_hz: tuple[float, float] | None, *, whole: bool = False) -> float:
+def _shaken(
+    sheet: InertialSheet,
+    part: str,
+    rotor_hz: tuple[float, float] | None,
+    weight: Callable[[float], float] | None = None,
+) -> float:
     """Rms of both tones together in the readings of a vehicle that shakes more than the sheet's by its spread.
 
-    whole: with nothing taken off for the frequency at which a tone is read.
+    weight: how much a tone of a frequency [Hz] counts; by its harm where not given.
     """
-    left = [1.0, 1.0]
-    if rotor_hz is not None:
-        off = FOLLOWED_TO if part in NOTCHED else None
-        left = [
-            abs(sheet.left_of_tone(hz)) * (1.0 if whole else _harm(hz, float(sheet.rate_hz), off)) for hz in rotor_hz
-        ]
+    off = FOLLOWED_TO if part in NOTCHED else None
+    counts = weight if weight is not None else lambda hz: _harm(hz, float(sheet.rate_hz), off)
+    left = (1.0, 1.0) if rotor_hz is None else tuple(abs(sheet.left_of_tone(hz)) * counts(hz) for hz in rotor_hz)
     shake = sheet.vibration
     amplitude = math.hypot(left[0] * getattr(shake.rotor, part), left[1] * getattr(shake.blades, part))
     return (1.0 + shake.spread) * amplitude / math.sqrt(2.0)
+
+
+def _tones_as_noise(sheet: InertialSheet, rotor_hz: tuple[float, float]) -> float:
+    """Density [rad/s/sqrt(Hz)] of the white noise that `vibration.followed_gyro_power` takes the gyro's tones for.
+
+    The second difference of a tone at the angle w a reading has (2 - 2 cos w)^2 times its mean square, that of white
+    noise six times.
+    """
+    shown = _shaken(sheet, "tilt_deg_s", rotor_hz, lambda hz: 2.0 - 2.0 * math.cos(read_angle(hz, sheet.period_s)))
+    return math.radians(shown) * math.sqrt(sheet.period_s / 6.0)
 
 
 def _read_hz(tone_hz: float, rate_hz: float) -> float:

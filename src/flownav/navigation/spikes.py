@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.compile import ONE_LANE, equation, kernel, larger, pointer, smaller
+from flownav.core.compile import ONE_LANE, equation, kernel, larger, pointer, replacing, smaller
 from flownav.core.measurement import Array
 from flownav.estimation.states import ATTITUDE, VELOCITY
 from flownav.navigation.inertial import size_of, sound
@@ -40,7 +40,11 @@ BURST_S = 0.3  # spikes that last longer are what happened: chosen, the longest 
 RETURN_SHARE = 0.5  # of the possible jump: so near a reading must come to what was before the burst: not measured
 MOST_DOUBT_M_S = 1.0  # what a burst that was none may have done to the velocity: chosen, not measured
 MOST_DOUBT_RAD = 0.2  # and to the attitude: chosen, not measured
+JUMP_OF_RMS = 2.2  # from one reading of white noise to the next, three axes, over the rms of one: sqrt(6) in the rms
 LONE_SHARE = 0.3  # of that, for one reading alone: a hard touchdown at 50 Hz, as outdoor-3's; chosen
+
+
+with_usual = replacing(SpikeMemory, "accel_m_s2")
 
 
 @equation
@@ -142,7 +146,10 @@ def drop_spikes(reading: Reading, start: StartMemory, m: ImuMemory, before: Spik
     """A spike did not arrive."""
     judged = sound(reading) and np.isfinite(m.read_s) and start.started > 0.0
     step_s = t_s - m.read_s
-    jumps, after = judge_spike(reading, step_s, m, before)
+    usual = (
+        larger(before.accel_m_s2, JUMP_OF_RMS * np.sqrt(start.shaken)) if before.reach_s == 0.0 else before.accel_m_s2
+    )
+    jumps, after = judge_spike(reading, step_s, m, with_usual(before, accel_m_s2=usual))
     spike = judged and jumps
     moved = doubt_of(reading, step_s, m, after) if spike else 0.0
     turned = turning_doubt_of(reading, step_s, m, after) if spike else 0.0

@@ -8,17 +8,17 @@ from flownav.core.compile import Lanes, Work, arctan2, equation, larger, procedu
 from flownav.core.frames import GRAVITY_M_S2, Quaternion, Rotation, quaternion_from_euler, to_earth
 from flownav.core.measurement import Sensor
 from flownav.estimation.covariance import begin_lane, lagged, set_covariance, set_variance, states_of
-from flownav.estimation.hypotheses import COUNT, begin_lane_anew
+from flownav.estimation.hypotheses import begin_lane_anew
 from flownav.estimation.laws import component
 from flownav.estimation.named import Attitude, PositionNed, rotation_by
-from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, POSITION, RATE, VELOCITY
+from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, MOST_HYPOTHESES, POSITION, RATE, VELOCITY
 from flownav.navigation.before_start import waits
 from flownav.navigation.course import with_sought
 from flownav.navigation.lagged_flow import start_lag
 from flownav.navigation.memory import MEMORY
 from flownav.navigation.motion_records import SteadyForce
 from flownav.navigation.offers import with_aid
-from flownav.navigation.packed import START_SIGMA, load_filter_settings, load_flow_settings
+from flownav.navigation.packed import START_SIGMA, load_filter_settings, load_flow_settings, load_imu_settings
 from flownav.navigation.place import ON_GROUND
 from flownav.navigation.reasons import is_heard
 from flownav.navigation.records import AidMemory, HeadingMemory, Reading, ScaleDoubt, StartMemory
@@ -41,7 +41,7 @@ LEAST_LEVELLING = 5.0  # readings whose mean is level: 0.1 s at 50 Hz
 # so sure a mean will do (0.6 deg); a shaken vehicle's is waited for
 LEVELLED_M_S2, LEVELLING_S = 0.1, 1.0
 HOVERING_M_S2 = 0.15  # how it may accelerate over that second: chosen; with 0.1 laps from the start err 2.6 sigma
-RECTIFIED_SHARE = 0.1  # of what shakes an accelerometer lasts in its mean: chosen; 1 is the false roll of `landing`
+
 
 with_started = replacing(StartMemory, "started")
 
@@ -154,7 +154,7 @@ def begin(work: Work, lanes: Lanes, lane: int, first: FirstState, p: Work) -> No
         set_variance(work, lanes, ATTITUDE + i, lane, first.heading_variance if i == 2 else level.tilt_variance)
         set_variance(work, lanes, ACCEL_BIAS + i, lane, level.bias_variance_z if i == 2 else level.bias_variance)
     tie_tilt(work, lanes, lane, rotation_by(first.attitude), level.shared)
-    for fault in range(COUNT):
+    for fault in range(MOST_HYPOTHESES):
         begin_lane_anew(work, lanes, states_of(lanes), fault, lane)
     doubted = load_filter_settings(p).flow_scale_sigma if first.untold_scale else 0.0
     store_doubt(work, lanes, lane, ScaleDoubt(doubted))
@@ -175,16 +175,17 @@ MEMORY.sink(FirstState, begin, "p")
 
 
 @equation
-def levelling(m: StartMemory, bias_sigma: float, read: bool, unknown: bool) -> Levelling:
+def levelling(m: StartMemory, bias_sigma: float, rectified: float, read: bool, unknown: bool) -> Levelling:
     """Tilt and accelerometer's bias by the mean specific force g theta + b + n of a vehicle that does not accelerate.
 
     A tilt of STANDING_TILT_RAD and a bias, with what vibration makes of it, are expected; the noise n is what shakes
-    the readings, over their number. Where the heading is to be found, tilt (north, east) and bias (body) stay untied.
+    the readings, over their number. rectified: of what shakes an accelerometer, how much lasts in its mean. Where the
+    heading is to be found, tilt (north, east) and bias (body) stay untied.
     """
-    lasting = squared(bias_sigma) + squared(RECTIFIED_SHARE) * m.shaken
+    lasting = squared(bias_sigma) + squared(rectified) * m.shaken
     tilted, doubt = squared(GRAVITY_M_S2 * STANDING_TILT_RAD), lasting + noise_of_mean(m)
     believed, of_bias = tilted / (tilted + doubt), lasting / (tilted + doubt)
-    shaken = squared(bias_sigma) + m.shaken
+    shaken = squared(bias_sigma) + larger(squared(rectified), 1.0) * m.shaken
     return Levelling(
         1.0 if read else believed,
         0.0 if read else of_bias * m.force_x,
@@ -218,14 +219,14 @@ class Beginning(NamedTuple):
 @on_lanes
 def start_lanes(
     reading: Reading, m: StartMemory, aid: AidMemory, heading: HeadingMemory, *, t_s: float, sensor: int,
-    fitted: Equipment, bias_sigma: float,
+    fitted: Equipment, bias_sigma: float, rectified: float,
 ) -> Beginning:  # fmt: skip
     """The first instant of the lanes that start."""
     begins = starts(reading, m, t_s, sensor, fitted.deadline_s)
     at_fix = has_fix(reading, sensor)
     read, lost = bool(np.isfinite(m.attitude_s)), bool(np.isfinite(fitted.deadline_s))
     unknown = fitted.heading == NO_HEADING and lost and not read
-    levels = levelling(m, bias_sigma, read, unknown)
+    levels = levelling(m, bias_sigma, rectified, read, unknown)
     w, x, y, z = (m.qw, m.qx, m.qy, m.qz) if read else level(m, levels.believed, heading.field_rad, fitted)
     turned = heading_sigma(read, lost, unknown, heading.field_rad, fitted.heading)
     attitude = Attitude(w, x, y, z)
@@ -253,7 +254,17 @@ def start_lanes(
 def try_start(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p: Work, o: Output) -> bool:
     """Start the lanes that can start. Whether any lane runs."""
     if waits(work, lanes) and any_starts(work, lanes, t_s, sensor, fitted.deadline_s):
-        start_lanes(work, lanes, t_s, sensor, fitted, p[START_SIGMA + ACCEL_BIAS], p, o)
+        start_lanes(
+            work,
+            lanes,
+            t_s,
+            sensor,
+            fitted,
+            p[START_SIGMA + ACCEL_BIAS],
+            load_imu_settings(p).vibration_rectified_share,
+            p,
+            o,
+        )
     return bool(runs(work, lanes))
 
 

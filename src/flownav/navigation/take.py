@@ -48,16 +48,18 @@ from flownav.navigation.packed import (
     load_place_settings,
 )
 from flownav.navigation.place import take_landed, take_pad, take_pose
-from flownav.navigation.protection import mind_faults, set_levels
+from flownav.navigation.protection import set_levels
 from flownav.navigation.spikes import drop_spikes
 from flownav.navigation.start import runs, try_start
-from flownav.navigation.still import stand_still, watch_gps_velocity, watch_imu, watch_range
+from flownav.navigation.still import stand_still
+from flownav.navigation.suspicion import mind_faults
 from flownav.navigation.tape import ESTIMATE_PERIOD_S, Output, output_of, write_estimate
 from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
 from flownav.navigation.vibration import add_vibration_noise, limit_biases
+from flownav.navigation.windows import watch_gps_velocity, watch_imu, watch_range
 
 LONGEST_STEP_S = 0.1  # chosen, not measured: only pauses of the IMU make longer ones
-MOST_STEPS = 10000  # chosen: 1000 s in steps of LONGEST_STEP_S; a pause of hours takes longer ones (test_long_pauses)
+MOST_STEPS = 10000.0  # chosen: 1000 s in steps of LONGEST_STEP_S; a pause of hours takes longer ones (test_long_pauses)
 # Standard deviations: more than this, and correlations are beyond a double's digits. Without it variances are NaN after
 # two hours without an aid (test_long_pauses).
 LOST_M, LOST_M_S = 1e5, 1e6
@@ -70,32 +72,57 @@ def navigate(work: Work, lanes: Lanes, p: Work, o: Output, t_s: float, sensor: i
     if too_old(work, lanes, t_s, sensor, o):
         return
     fitted = load_equipment(p)
-    gather(work, lanes, t_s, sensor)
+    receive(work, lanes, t_s, sensor, fitted, p, o)
+    if runs(work, lanes):
+        advance(work, lanes, lagged(lanes), t_s, p, o)
+    arrive(work, lanes, t_s, sensor, fitted, p, o)
+    take(work, lanes, t_s, sensor, fitted, p, o)
+    leave(work, lanes, t_s, sensor, p, o)
+
+
+# -- a reading's way, part by part: on board each may be done at another time (`onboard`) ------------------------
+@equation
+def receive(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p: Work, o: Output) -> None:
+    """What a reading says of the time before it: whether it is a spike, and what moves the filter up to its instant."""
     heard = sensor == Sensor.IMU and fitted.use_imu
-    running = bool(runs(work, lanes))
-    if running:
+    gather(work, lanes, t_s, sensor)
+    if runs(work, lanes):
         if heard:
             drop_spikes(work, lanes, t_s, o)
         step_s = t_s - shared(work, lanes, CLOCK)
         judge_motion(work, lanes, t_s, step_s, heard, load_imu_settings(p), o)
-        advance(work, lanes, lagged(lanes), t_s, p, o)
-        if heard:
-            keep_imu(work, lanes, t_s)
+
+
+@equation
+def arrive(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p: Work, o: Output) -> None:
+    """The filter is at the reading's instant; where it waits for its start it starts, if this reading lets it."""
+    running = bool(runs(work, lanes))
+    if running and sensor == Sensor.IMU and fitted.use_imu:
+        keep_imu(work, lanes, t_s)
     if sensor == Sensor.IMU:
         watch_imu(work, lanes)
     if t_s - shared(work, lanes, ERRORS_CLOCK) >= LONGEST_LAG_OF_ERRORS_S:
         catch_up_errors(work, lanes, t_s, p, o)
     share(work, lanes, CLOCK, t_s)
-    if not running:
-        running = try_start(work, lanes, t_s, sensor, fitted, p, o)
-    elif len(lanes) > 1:
+    if not running or len(lanes) > 1:
         try_start(work, lanes, t_s, sensor, fitted, p, o)
     watch_others(work, lanes, sensor)
     consider_datum(work, lanes, fitted)
-    take(work, lanes, t_s, sensor, fitted, p, o)
+
+
+@equation
+def leave(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
+    """What follows once a reading is taken: a vehicle may stand; `go_on`."""
     if sensor == Sensor.IMU:
         stand_still(work, lanes, t_s, p, o)
+    go_on(work, lanes, t_s, p, o)
+
+
+@equation
+def go_on(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) -> None:
+    """Aids grow old, and an estimate may be due."""
     consider_none(work, lanes)
+    running = bool(runs(work, lanes))
     if running:
         note_aid_age(work, lanes, t_s, load_aid_settings(p), o)
     if t_s - shared(work, lanes, LAST_ESTIMATE) >= ESTIMATE_PERIOD_S:
@@ -178,29 +205,41 @@ def advance(work: Work, lanes: Lanes, lag: bool | None, t_s: float, p: Work, o: 
 
     lag: `covariance.lagged`, whether the flow sensor's dynamics are states.
     """
+    steps, dt_s = steps_to(work, lanes, t_s)
+    for _ in range(steps):
+        step_once(work, lanes, lag, dt_s, p, o)
+    if steps > 0:
+        give_up(work, lanes, o)
+
+
+@equation
+def steps_to(work: Work, lanes: Lanes, t_s: float) -> tuple[int, float]:
+    """In how many steps, of how many seconds each, the filter comes to an instant; none where that is no way ahead."""
     ahead_s = t_s - shared(work, lanes, CLOCK)
     if not ahead_s > 0.0 or not np.isfinite(ahead_s):
-        return
+        return 0, 0.0
+    steps = int(min(np.ceil(ahead_s / LONGEST_STEP_S), MOST_STEPS))
+    return steps, ahead_s / steps
+
+
+@equation
+def step_once(work: Work, lanes: Lanes, lag: bool | None, dt_s: float, p: Work, o: Output) -> None:
+    """One step of the filter's motion and of all that goes along with it."""
     settings = load_filter_settings(p)
-    imu = load_imu_settings(p)
-    steps = min(int(np.ceil(ahead_s / LONGEST_STEP_S)), MOST_STEPS)
-    dt_s = ahead_s / steps
-    for _ in range(steps):
-        for lane in range(len(lanes)):
-            if load_step(work, lanes, lane).moves == 0.0:
-                hold_still(work, lanes, lane)
-        if lag is not None:
-            predict_with_lag(work, lanes, dt_s, settings, flow_lag(load_flow_settings(p), dt_s))
-        else:
-            predict(work, lanes, STATES, dt_s, settings)
-        steady_force(work, lanes, dt_s)
-        note_push(work, lanes, dt_s)
-        propagate_walks(work, lanes, dt_s, settings)
-        walk_below(work, lanes, dt_s, load_height_settings(p), load_place_settings(p))
-        add_vibration_noise(work, lanes, dt_s, imu)
-        if len(lanes) == 1:
-            note_prediction(work, lanes, dt_s, o)
-    give_up(work, lanes, o)
+    for lane in range(len(lanes)):
+        if load_step(work, lanes, lane).moves == 0.0:
+            hold_still(work, lanes, lane)
+    if lag is not None:
+        predict_with_lag(work, lanes, dt_s, settings, flow_lag(load_flow_settings(p), dt_s))
+    else:
+        predict(work, lanes, STATES, dt_s, settings)
+    steady_force(work, lanes, dt_s)
+    note_push(work, lanes, dt_s)
+    propagate_walks(work, lanes, dt_s, settings)
+    walk_below(work, lanes, dt_s, load_height_settings(p), load_place_settings(p))
+    add_vibration_noise(work, lanes, dt_s, load_imu_settings(p))
+    if len(lanes) == 1:
+        note_prediction(work, lanes, dt_s, o)
 
 
 @procedure

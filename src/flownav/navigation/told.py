@@ -153,6 +153,7 @@ class ImuSettings(NamedTuple):
     accel_noise_down_share: float
     gyro_noise_rad_s_rt_hz: float
     gyro_scale_sigma: float
+    gyro_tones_rad_s_rt_hz: float
     accel_walk_m_s2_rt_s: float
     coasting_accel_m_s2_rt_hz: float
     coasting_rate_rad_s_rt_hz: float
@@ -163,6 +164,7 @@ class ImuSettings(NamedTuple):
     vibration_free_m_s2: float
     vibration_walk_per_rt_s: float
     vibration_bias_share: float
+    vibration_rectified_share: float
     accel_bias_limit_m_s2: float
     gyro_bias_limit_rad_s: float
 

@@ -12,7 +12,7 @@ import numpy as np
 from flownav.core.compile import Lanes, Work, equation
 from flownav.core.frames import Rotation
 from flownav.estimation.covariance import add_noise_lane, covariance_of, variance_of
-from flownav.estimation.hypotheses import sign
+from flownav.estimation.hypotheses import leave, sign
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import (
     ACCEL_BIAS,
@@ -110,6 +110,19 @@ class AxisVelocity(NamedTuple):
     variance: float
 
 
+class AxisBias(NamedTuple):
+    """The gyro's bias about one body axis, as the filter says [rad/s], and its variance."""
+
+    rad_s: float
+    variance: float
+
+
+class Anywhere(NamedTuple):
+    """Whether something is so in any lane."""
+
+    any: bool
+
+
 # -- what a judge returns ---------------------------------------------------------------------------------------
 class Offer(NamedTuple):
     """One component for the filter: its value and variance; reason: FUSED where it may be tested, or why not."""
@@ -196,6 +209,13 @@ class Doubt(NamedTuple):
     variance: float
 
 
+class Left(NamedTuple):
+    """What a fault may have left in a state unnoticed, which was taken for something else."""
+
+    state: int
+    value: float
+
+
 UNKNOWN_M = 100.0  # the doubt of a ground, an origin or a pad that is about to be found: more than a first fix errs
 
 NO_EVENT = Event(-1, 0.0)
@@ -226,6 +246,13 @@ def axis_velocity(work: Work, lanes: Lanes, axis: int, lane: int) -> AxisVelocit
     """One axis of a lane's velocity."""
     speed_m_s = work[(STATE + VELOCITY + axis) * len(lanes) + lane]
     return AxisVelocity(speed_m_s, variance_of(work, lanes, VELOCITY + axis, lane))
+
+
+@equation
+def axis_bias(work: Work, lanes: Lanes, axis: int, lane: int) -> AxisBias:
+    """The bias of a lane's gyro about one axis."""
+    rad_s = work[(STATE + GYRO_BIAS + axis) * len(lanes) + lane]
+    return AxisBias(rad_s, variance_of(work, lanes, GYRO_BIAS + axis, lane))
 
 
 @equation
@@ -265,6 +292,12 @@ def doubt(work: Work, lanes: Lanes, lane: int, given: Doubt) -> None:
     add_noise_lane(work, lanes, given.state, lane, given.variance)
 
 
+@equation
+def note_left(work: Work, lanes: Lanes, lane: int, given: Left) -> None:
+    """Note what may be wrong with a state."""
+    leave(work, lanes, given.state, lane, given.value)
+
+
 MEMORY.name(Biases, *(STATE + GYRO_BIAS + i for i in range(3)), *(STATE + ACCEL_BIAS + i for i in range(3)))
 MEMORY.name(Force, *(FORCE + i for i in range(3)))
 MEMORY.name(AppliedMotion, *(IMU + i for i in range(6)))
@@ -281,10 +314,12 @@ MEMORY.name(HeldBack, HELD_BACK)
 MEMORY.derive(Height, height_of)
 MEMORY.derive(GroundBelow, ground_below)
 MEMORY.derive(AxisVelocity, axis_velocity, "axis")
+MEMORY.derive(AxisBias, axis_bias, "axis")
 MEMORY.sink(Offer, offer)
 MEMORY.sink(Event, tell, "t_s", "o")
 MEMORY.sink(Reset, reset, "o")
 MEMORY.sink(Sign, note_sign)
 MEMORY.sink(Doubt, doubt)
+MEMORY.sink(Left, note_left)
 
 on_lanes = MEMORY.on_lanes

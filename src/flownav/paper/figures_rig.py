@@ -17,7 +17,7 @@ from flownav.paper.laboratory import Laboratory, reading
 from flownav.paper.published import HEIGHTS_M
 from flownav.report.chart import Stack, drawn
 from flownav.report.panels import Panel
-from flownav.report.style import COLOUR, axis, layout, plotly
+from flownav.report.style import COLOUR, axis, drawing, layout
 
 PAPER, HERE = "gps", "estimate"  # whose figures: the colour of each
 GREY = [[0, "rgb(0,0,0)"], [1, "rgb(255,255,255)"]]
@@ -51,7 +51,7 @@ def figure(
     looks = layout(height_px) | {"hovermode": "closest"}
     looks["xaxis"] = axis(x_title) | {"zeroline": False} | axes.get("xaxis", {})
     looks["yaxis"] = axis(y_title) | {"zeroline": False} | axes.get("yaxis", {})
-    return plotly(traces, looks)
+    return drawing(traces, looks)
 
 
 def pictures(images: list[tuple[str, ArrayLike]], height_px: int = 300) -> Any:
@@ -73,7 +73,7 @@ def pictures(images: list[tuple[str, ArrayLike]], height_px: int = 300) -> Any:
         over = {"x": left + 0.5 * width, "y": 1.0, "xref": "paper", "yref": "paper"}
         middle = {"xanchor": "center", "yanchor": "bottom", "showarrow": False}
         looks["annotations"].append({"text": title, "font": {"size": 12, "color": COLOUR["ink"]}, **over, **middle})
-    return plotly(data, looks)
+    return drawing(data, looks)
 
 
 def heights_axis() -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """Parts that somebody else wrote: a filter, a sensor, a vehicle or a controller in one file, flown in place of ours."""
 
+from flownav.control.guidance import Reference
 from flownav.parts.protocols import (
     Controller,
     Estimate,
@@ -16,9 +17,12 @@ from flownav.parts.protocols import (
     Values,
     VehicleModel,
 )
+from flownav.vehicle.state import Around, Controls
 
 __all__ = [
+    "Around",
     "Controller",
+    "Controls",
     "Estimate",
     "Filter",
     "Flown",
@@ -27,6 +31,7 @@ __all__ = [
     "Outputs",
     "Parts",
     "Reading",
+    "Reference",
     "SensorModel",
     "Told",
     "Truth",

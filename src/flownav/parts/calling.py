@@ -2,11 +2,13 @@
 
 import ctypes
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from flownav.core.errors import InputError
 
+LONGEST_NAME, LONGEST_SAID = 60, 400  # letters of a message; a compiler says pages
 KINDS = {"p": ctypes.c_void_p, "q": ctypes.c_void_p, "d": ctypes.c_double, "i": ctypes.c_int64}
 
 
@@ -21,11 +23,30 @@ class Mistakes:
         """InputError with the part's exception as its cause, or Ctrl-C; nothing where all went well."""
         if self.first is None:
             return
-        if isinstance(self.first, InputError | KeyboardInterrupt):
+        with telling(self.name):
             raise self.first
-        kind = type(self.first).__name__
-        said = " ".join(str(self.first).split())
-        raise InputError(f"{self.name}: {kind}: {said}; mend it (the Python traceback says where)") from self.first
+
+
+@contextmanager
+def telling(name: str) -> Iterator[None]:
+    """What a part raises in here is an InputError of one line, and its exception the cause; Ctrl-C stays Ctrl-C."""
+    try:
+        yield
+    except (InputError, KeyboardInterrupt):
+        raise
+    except BaseException as mistake:
+        raise InputError(f"{name}: {words_of(mistake)}; mend it (the Python traceback says where)") from mistake
+
+
+def words_of(mistake: BaseException) -> str:
+    """An exception in one line, its kind and what it says, if it can."""
+    try:
+        said = " ".join(str(mistake).split())
+    except Exception:
+        said = ""
+    half = LONGEST_SAID // 2
+    short = said if len(said) <= LONGEST_SAID else f"{said[:half]} ... {said[-half:]}"
+    return f"{type(mistake).__name__}: {short}" if short else type(mistake).__name__
 
 
 class Called:
@@ -49,6 +70,7 @@ class Called:
 
 
 def name_of(part: object) -> str:
-    """How messages and records call a part: its `name`, or its class."""
+    """How messages and records call a part: its `name`, or its class; in one short line whatever it is."""
     kind = part if isinstance(part, type) or inspect.isfunction(part) else type(part)
-    return str(getattr(part, "name", "") or kind.__name__)
+    named = str(getattr(part, "name", "") or kind.__name__)
+    return " ".join("".join(letter if letter.isprintable() else " " for letter in named).split())[:LONGEST_NAME]

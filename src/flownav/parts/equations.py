@@ -34,6 +34,7 @@ from flownav.navigation.memory import (
 from flownav.navigation.records import Reading as Row
 from flownav.navigation.take import UNIT_SIGNATURE
 from flownav.navigation.tape import ESTIMATE_PERIOD_S, output_of, write_estimate
+from flownav.parts.calling import telling
 from flownav.parts.protocols import Estimate, Imu, Innovation, Outputs, Reading, Told
 from flownav.simulation import layout
 from flownav.simulation.layout import load_around, load_controls
@@ -46,7 +47,7 @@ NAN = math.nan
 class Said(NamedTuple):
     """What a filter says, as `protocols.Estimate` in scalars. known: 1 once it has started; variances in m2, m2/s2.
 
-    grounded: 1 once ground_d is known.
+    grounded: 1 once ground_d is known. What equations leave out at its end is by default.
     """
 
     known: float
@@ -74,6 +75,12 @@ class Said(NamedTuple):
     accel_bias_z: float = 0.0
     grounded: float = 0.0
     ground_d: float = 0.0
+
+
+def address_of(compiled: Unit, name: str) -> int:
+    """The address of a part's equations, compiled where they are not yet. InputError where they cannot be."""
+    with telling(f"{name}: its equations cannot be compiled"):
+        return compiled.address
 
 
 # the rows that simulator and tape read what a filter says from, field by field

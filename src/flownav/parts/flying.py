@@ -14,6 +14,7 @@ from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from flownav.campaigns.engines import Engine, Local, Part
 from flownav.campaigns.local import fly_recorded, record_flown, rows_of
@@ -22,29 +23,30 @@ from flownav.campaigns.run import Recording
 from flownav.core.compile import LANES, ONE_LANE, announce_compilation
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array
-from flownav.core.record import Record
+from flownav.core.record import POSITION_NED, VELOCITY_BODY, Record
 from flownav.logs.log import Log
 from flownav.navigation.loop import Running
 from flownav.navigation.packed import load_flow_settings
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.take import navigator_unit
 from flownav.navigation.told import carries_lag
-from flownav.parts.calling import Mistakes, name_of
-from flownav.parts.equations import EquationFilter, EquationVehicle
+from flownav.parts.calling import Mistakes, name_of, telling, words_of
+from flownav.parts.equations import EquationFilter, EquationVehicle, address_of
 from flownav.parts.plant import OwnController, OwnReadings, OwnVehicle
 from flownav.parts.protocols import Filter, Parts, Told
-from flownav.parts.taking import Taker
+from flownav.parts.taking import LARGEST, Taker
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import Replay, replay
 from flownav.simulation.assemble import Setup
-from flownav.simulation.engine import Flown, Instead, buffers_of, fly_into
+from flownav.simulation.engine import Flown, Instead, buffers_of, fly_into, learnt_in
 from flownav.simulation.ensemble import Ensemble
-from flownav.simulation.history import column
+from flownav.simulation.history import column, columns
 from flownav.simulation.plan import Flight, OwnParts
 from flownav.simulation.sensing import EPOCH_S
 from flownav.simulation.truth import SensorFault
 
 One = TypeVar("One")
+ERRORS, TRUE_PLACE = tuple(f"error_{name}" for name in (*POSITION_NED, *VELOCITY_BODY)), ("truth", POSITION_NED)
 
 
 def fresh(part: One | type[One] | Callable[[], One]) -> One:
@@ -58,8 +60,7 @@ def fresh(part: One | type[One] | Callable[[], One]) -> One:
     try:
         made: One = make()
     except Exception as mistake:
-        said = " ".join(str(mistake).split())
-        raise InputError(f"{name_of(part)}: cannot be made: {type(mistake).__name__}: {said}") from mistake
+        raise InputError(f"{name_of(part)}: cannot be made: {words_of(mistake)}") from mistake
     return made
 
 
@@ -102,9 +103,9 @@ def names_of(parts: Parts) -> dict[str, Any]:
 
 
 def require_started(flight: Flight, history: Array, name: str) -> None:
-    """InputError where a filter had said nothing by when it was to be flown on; until it speaks the truth is flown on.
+    """InputError where a filter had said nothing by when it was to be flown on, or said what no vehicle does.
 
-    history: (epochs, len(HISTORY), lanes).
+    Until it speaks the truth is flown on. history: (epochs, len(HISTORY), lanes).
     """
     assert flight.table is not None
     first = math.ceil(flight.plan.handover_s / EPOCH_S) + flight.table.horizon_epochs + 1
@@ -117,6 +118,16 @@ def require_started(flight: Flight, history: Array, name: str) -> None:
             f"filter {name}: {when}, and is flown on from {flight.plan.handover_s:g} s on: estimate() must say "
             "something by then"
         )
+    errors, places = (history[first:, columns(table, names)] for table, names in (("horizon", ERRORS), TRUE_PLACE))
+    wild = np.any(~np.all(np.abs(errors) <= LARGEST, axis=1) & np.all(np.isfinite(places), axis=1), axis=1)
+    require_none(wild, EPOCH_S * np.arange(first, first + len(errors), dtype=np.float64), name)
+
+
+def require_none(wild: ArrayLike, t_s: Array, name: str) -> None:
+    """InputError at the first instant at which a filter said what no vehicle does; wild, t_s: (n,)."""
+    if np.any(wild):
+        at_s = float(t_s[int(np.argmax(wild))])
+        raise InputError(f"filter {name}: its estimate of {at_s:.2f} s is not finite, or beyond {LARGEST:g}; mend it")
 
 
 def fly_parts(
@@ -136,14 +147,15 @@ def fly_parts(
         taker: Taker | None = None
         if isinstance(parts.filter, EquationFilter):
             compiled = parts.filter.unit(ONE_LANE)
-            instead = compiled.address
+            instead = address_of(compiled, f"filter {name_of(parts.filter)}")
         elif parts.filter is not None:
             told = Told(fitted.told.settings.settings(fitted.equipment, fitted.told.noise))
             taker = Taker(parts.filter, told, b.nav, b.tape, mistakes)
             instead = taker.address
         if parts.sensors:
             for sensor in parts.sensors:
-                sensor.start(seed, index)
+                with telling(f"sensor {name_of(sensor)}"):
+                    sensor.start(seed, index)
             then: Callable[..., None] = taker.called.entry if taker else compiled
             readings = OwnReadings(parts.sensors, table, b, then, mistakes)
             instead = readings.address
@@ -151,18 +163,22 @@ def fly_parts(
         vehicle = OwnVehicle(parts.vehicle, b.work, mistakes) if parts.vehicle and fast is None else None
         controller = OwnController(parts.controller, flight, b.work, mistakes) if parts.controller else None
         if vehicle or controller or fast:
-            stepped = fast.address if fast else (vehicle.called.address if vehicle else 0)
+            stepped = vehicle.called.address if vehicle else 0
+            if fast:
+                stepped = address_of(fast, f"vehicle {name_of(parts.vehicle)}")
             flight = flight._replace(own=OwnParts(stepped, controller.called.address if controller else 0))
         faults = None if fault is None else [fault]
         fly_into(flight, seed, index, ONE_LANE, b, ensemble, Instead(faults=faults, take=instead))
     mistakes.tell()
     if parts.filter is not None:
         require_started(flight, b.history, name_of(parts.filter))
-    return Flown(b.history, b.tape, b.fed)
+    return Flown(b.history, b.tape, b.fed, learnt_in(b.work, ONE_LANE))
 
 
 class OwnPartsEngine:
     """parts: flown in every flight, each beginning anew; a filter of equations alone, on lanes as ours."""
+
+    piece = 1
 
     def __init__(self, parts: Parts) -> None:
         self.parts = parts
@@ -174,7 +190,7 @@ class OwnPartsEngine:
         own = self.parts
         if isinstance(own.filter, EquationFilter) and not (own.sensors or own.vehicle or own.controller):
             with announce_compilation("batch"):
-                address = own.filter.unit(LANES).address
+                address = address_of(own.filter.unit(LANES), f"filter {name_of(own.filter)}")
             check = partial(require_started, name=name_of(own.filter))
             yield from Local(instead=address, check=check).fly(cell, seed, parts, on_progress)
             return
@@ -219,7 +235,10 @@ def _digest(part: Any) -> str:
         told = {name: value for name, value in own.items() if not name.startswith("_") and name != "unit_source"}
         made_of += [value for value in told.values() if inspect.isfunction(value)]
         numbers = {name: value for name, value in told.items() if not inspect.isfunction(value)}
-        digest.update(json.dumps(numbers, sort_keys=True, default=_plain).encode())
+        try:
+            digest.update(json.dumps(numbers, sort_keys=True, default=_plain).encode())
+        except (TypeError, ValueError, RecursionError):  # keys of several kinds, or what holds itself
+            digest.update(repr(numbers).encode(errors="backslashreplace"))
     for each in made_of:
         digest.update(f"{each.__module__} {each.__qualname__} {_source(each)}".encode())
     return digest.hexdigest()
@@ -249,7 +268,7 @@ def replay_with(log: Log, options: ReplayOptions, settings: NavigatorSettingsFil
 
     def instead(running: Running) -> int:
         if isinstance(part, EquationFilter):
-            return part.unit(ONE_LANE).address
+            return address_of(part.unit(ONE_LANE), f"filter {name_of(part)}")
         kept.append(Taker(fresh(part), Told(running.told), running.work, running.tape, mistakes))
         return kept[-1].address
 
@@ -259,4 +278,7 @@ def replay_with(log: Log, options: ReplayOptions, settings: NavigatorSettingsFil
         mistakes.tell()  # its own mistake says more than that it never started
         raise
     mistakes.tell()
+    said = flown.said
+    motion = np.column_stack([said.pos_ned_m, said.vel_frd_m_s, said.quaternion])
+    require_none(~np.all(np.abs(motion) <= LARGEST, axis=1), said.t_s, name_of(part))
     return flown

@@ -14,7 +14,7 @@ from flownav.core.frames import GRAVITY_M_S2, rotation_from_quaternion
 from flownav.core.measurement import COLUMNS, MAX_VALUES, Array, Sensor
 from flownav.navigation.memory import READING
 from flownav.navigation.take import UNIT_SIGNATURE
-from flownav.parts.calling import Called, Mistakes, name_of
+from flownav.parts.calling import Called, Mistakes, name_of, telling
 from flownav.parts.protocols import Controller, Flown, SensorModel, Truth, Values, VehicleModel
 from flownav.simulation import layout
 from flownav.simulation.block import Buffers
@@ -80,7 +80,8 @@ class OwnController:
 
     def __init__(self, part: Controller, flight: Flight, work: Array, mistakes: Mistakes) -> None:
         self._part, self._flight, self._work, self._calls = part, flight, work, 0
-        part.start(flight.gains)
+        with telling(f"controller {name_of(part)}"):
+            part.start(flight.gains)
         self.called = Called(f"controller {name_of(part)}", self._steer, "p", mistakes)
 
     def _steer(self, _work: int) -> None:

@@ -5,6 +5,7 @@ It is called as a compiled navigator is (`navigation.take.UNIT_SIGNATURE`), by t
 
 import math
 from collections.abc import Iterable
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from flownav.parts.protocols import Estimate, Filter, Imu, Innovation, Reading, 
 STATED = 3
 QUALITY, ARRIVED, WITHHELD = (READING + MAX_VALUES + STATED + i for i in range(3))
 STALE_S = 0.1  # so long an inertial reading serves
+LARGEST = 1e9  # metres, m/s, rad/s or m/s2 that an estimate may say: chosen, beyond any vehicle's
 UNIT_TOLERANCE = 1e-3  # how far a quaternion's length may be from 1
 
 
@@ -147,12 +149,14 @@ def checked(name: str, said: Estimate) -> dict[str, Array]:
     found: dict[str, Array] = {}
     for key in ("pos_ned_m", "vel_ned_m_s", "quaternion", "std_pos_ned_m", "std_vel_ned_m_s", "gyro_bias_rad_s",
                 "accel_bias_m_s2"):  # fmt: skip
-        array = np.asarray(tuple(getattr(said, key)), dtype=float)
         length = lengths.get(key, 3)
+        array = np.asarray(tuple(islice(getattr(said, key), length + 1)), dtype=float)
         if array.shape != (length,):
             raise InputError(f"{name}: estimate().{key} has shape {array.shape}; ({length},) is needed")
         if not key.startswith("std_") and not np.isfinite(array).all():
             raise InputError(f"{name}: estimate().{key} is not finite: {array.tolist()}")
+        if (np.abs(array) > LARGEST).any():
+            raise InputError(f"{name}: estimate().{key} is beyond {LARGEST:g}: {array.tolist()}")
         if key.startswith("std_") and (array < 0.0).any():
             raise InputError(f"{name}: estimate().{key} is below 0: {array.tolist()}; NaN where it states none")
         found[key] = array

@@ -17,10 +17,11 @@ from flownav.logs.log import Log, attitude_at
 from flownav.navigation.flags import flagged, flags_of
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tables import estimate_table, happenings, innovation_table, states_table
-from flownav.replays.judged import autopilot_path
+from flownav.replays.judged import autopilot_path, placed_here, setpoints
 from flownav.replays.prepare import FLOW, ReplayOptions, prepare
 from flownav.replays.session import Replay, replay
 from flownav.scoring.reference import velocity_of
+from flownav.scoring.vibration import spectrum_of
 from flownav.sensors.datasheet import IdentifiedFlow
 
 KEPT_SENSORS = (
@@ -31,6 +32,7 @@ KEPT_SENSORS = (
     Sensor.RANGE,
     Sensor.BARO,
     Sensor.PAD,
+    Sensor.LANDED,
 )
 LOST_AFTER_S = 1.0  # chosen: five fixes of a 5 Hz receiver; it writes events, and decides nothing
 DOWN = "pos_d_m"
@@ -56,9 +58,11 @@ def to_record(replay: Replay, scores: dict[str, Any], command: list[str] | str) 
         record.add(name, table)
     warned = flagged(said.t_s, flags_of(replay.written.event))
     record.add("judging", {"t_s": said.t_s, "flagged": warned.astype(float)})
-    own = autopilot_path(replay.log, replay.options.gps_delay_s, said.t_s, said.pos_ned_m)
-    if own is not None:
-        record.add("autopilot", own)
+    log, placed = replay.log, placed_here(replay.log, replay.options.gps_delay_s, said.t_s, said.pos_ned_m)
+    own, asked = autopilot_path(log, placed), setpoints(log, placed)
+    for name, beside in (("autopilot", own), ("setpoint", asked), ("battery", log.battery)):
+        if beside is not None:
+            record.add(name, beside)
     record.add("innovation", innovation_table(replay.innovation))
     record.add("events", _events(replay))
     return record
@@ -105,9 +109,16 @@ def _manifest(replay: Replay, scores: dict[str, Any], command: list[str] | str) 
             for found in replay.findings
         ],
         "notes": list(replay.prepared.notes),
+        **({} if (shaken := _vibration(log)) is None else {"vibration": shaken}),
         "judging": {"flight_s": None if replay.references.flight_s is None else list(replay.references.flight_s)},
         "scores": scores,
     }
+
+
+def _vibration(log: Log) -> dict[str, Any] | None:
+    """The spectrum of the log's inertial readings, which the record does not keep."""
+    imu = log.streams.get(Sensor.IMU)
+    return None if imu is None else spectrum_of(imu.t_s, imu.value)
 
 
 def _references(replay: Replay) -> dict[str, dict[str, Array]]:
@@ -145,6 +156,7 @@ def _events(replay: Replay) -> dict[str, Any]:
     for name, counts in replay.rejected().items():
         events += [(start, name, "rejected", reason, float(count)) for reason, count in counts.items()]
     events += happenings(replay.written.event)
+    events += [(row.t_s, "autopilot", row.kind, row.text, row.value) for row in replay.log.happened]
     for t0, t1 in replay.options.gps_outages_s:
         events += [(t0, "gps", "outage_start", "withheld on request", t1 - t0), (t1, "gps", "outage_end", "", np.nan)]
     for sensor in (Sensor.GPS_POSITION, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.RANGE):

@@ -8,13 +8,14 @@ import numpy as np
 from flownav.core.errors import InputError, arg
 from flownav.core.measurement import EventQueue, Sensor
 from flownav.core.parameter_files import check
-from flownav.logs.log import Log
+from flownav.logs.log import FedSegment, Log
+from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import Instead, run, start_navigator
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tables import Written, written_on
 from flownav.navigation.tape import tape_for
 from flownav.navigation.told import NO_STATED_NOISE, Equipment, FlowNoise
-from flownav.replays.prepare import Prepared, ReplayOptions, check_windows
+from flownav.replays.prepare import Prepared, ReplayOptions, check_windows, prepare
 
 
 def as_fed(
@@ -48,6 +49,15 @@ def as_fed(
 def prepared_as_fed(log: Log) -> Prepared:
     """The streams as they were fed."""
     return Prepared(dict(log.streams), log.notes, bool(log.fed[0].equipment["flow_gyro_is_imu"]))
+
+
+def segments_of(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile) -> list[FedSegment]:
+    """What each navigator of a log or record is fed, and its equipment: as a replay does it, with nothing cut."""
+    if log.fed:
+        return list(log.fed)
+    prepared = prepare(log, options)
+    fitted = equipment_of(prepared.streams, prepared.span_s[0], prepared.flow_gyro_is_imu, settings, log.origin_deg_m)
+    return [FedSegment(fitted._asdict(), prepared.queue)]
 
 
 def run_as_fed(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.measurement import Array, Sensor, Stream
-from flownav.core.record import Table
+from flownav.core.record import POSITION_NED, QUATERNION, Table
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
 from flownav.navigation.feed import SLOWEST_IMU_HZ, imu_serves, rate_hz
@@ -20,8 +20,8 @@ from flownav.replays.prepare import GPS
 from flownav.replays.sentinel import Finding
 from flownav.scoring.consistency import consistency_by_sensor
 from flownav.scoring.coverage import coverage_of
-from flownav.scoring.path import autopilot_errors, in_frame_of
-from flownav.scoring.reference import flight_of
+from flownav.scoring.path import autopilot_errors, moved_by, placed_in
+from flownav.scoring.reference import Alignment, flight_of
 
 ON_THE_GROUND = 20  # readings of a range that starts on the ground: chosen, 0.4 to 2 s
 LIFTED_M = 0.3  # sound ranges vary by 0.01 m on the ground (indoor-made); outdoor-2's sonar jumps, and errs by 4 s
@@ -172,12 +172,36 @@ def unfused(innovation: Array, streams: Mapping[Sensor, Stream]) -> list[Finding
     return found
 
 
-def autopilot_path(log: Log, gps_delay_s: float, t_s: Array, position: Array) -> Table | None:
-    """The autopilot's estimate in the frame of ours, t_s (n,) and position (n, 3); None where there is none.
+def placed_here(log: Log, gps_delay_s: float, t_s: Array, position: Array) -> Alignment | None:
+    """What puts the autopilot's frame into ours, t_s (n,) and position (n, 3); None without an estimate of its own."""
+    return None if log.autopilot is None else placed_in(t_s, position, log.autopilot, _gps(log, gps_delay_s))
+
+
+def autopilot_path(log: Log, placed: Alignment | None) -> Table | None:
+    """The autopilot's estimate in the frame of ours (`placed_here`); None where there is none.
 
     Columns as record.TABLES["autopilot"].
     """
-    return None if log.autopilot is None else in_frame_of(t_s, position, log.autopilot, _gps(log, gps_delay_s))
+    return None if placed is None or log.autopilot is None else moved_by(log.autopilot, placed)
+
+
+def setpoints(log: Log, placed: Alignment | None) -> Table | None:
+    """What the autopilot asked for in the frame of ours (`placed_here`): one table, NaN where it was not asked.
+
+    Columns as record.TABLES["setpoint"]; None without any. With nothing that tells how the frames lie there is no
+    position, and the attitude is as the log has it.
+    """
+    turned = Alignment(0.0, (0.0, 0.0, 0.0)) if placed is None else placed
+    usable = [one for one in log.setpoints if len(one["t_s"]) and (placed is not None or POSITION_NED[0] not in one)]
+    moved = [moved_by(table, turned) for table in usable]
+    times = np.unique(np.concatenate([table["t_s"] for table in moved])) if moved else np.zeros(0)
+    names = [name for name in (*POSITION_NED, *QUATERNION) if any(name in table for table in moved)]
+    joined = {"t_s": times} | {name: np.full(len(times), np.nan) for name in names}
+    for table in moved:
+        rows = np.searchsorted(times, table["t_s"])
+        for name in table.keys() - {"t_s"}:
+            joined[name][rows] = table[name]
+    return joined if len(times) else None
 
 
 def autopilot_scores(log: Log, gps_delay_s: float) -> dict[str, Any] | None:

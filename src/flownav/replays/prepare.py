@@ -271,19 +271,19 @@ def _followed(flow: Stream, difference: Array) -> Array:
     good = flow.quality != 0.0
     gain = 1.0 - np.exp(-np.diff(flow.t_s, prepend=flow.t_s[0]) / GYRO_BIAS_TIME_S)
     gain = np.maximum(gain, 1.0 / np.maximum(np.cumsum(good), 1))
-    return np.asarray(_low_pass(difference, np.where(good, gain, 0.0)))
+    followed = np.empty_like(difference)
+    _low_pass(difference, np.where(good, gain, 0.0), followed)
+    return followed
 
 
 @kernel
-def _low_pass(value: Array, gain: Array) -> Array:
-    """y += gain (value - y), column by column; value (n, k), gain (n,)."""
-    followed = np.empty_like(value)
+def _low_pass(value: Array, gain: Array, followed: Array) -> None:
+    """y += gain (value - y), column by column; value and what comes of it (n, k), gain (n,)."""
     for column in range(value.shape[1]):
         state = 0.0
         for row in range(value.shape[0]):
             state += gain[row] * (value[row, column] - state)
             followed[row, column] = state
-    return followed
 
 
 def _roughness(flow: Stream, rates: Array) -> Array:

@@ -6,11 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from flownav.core import guard
+from flownav.core.text import interval_words
 from flownav.core.version import __version__
 from flownav.report import campaign_figures as figures
 from flownav.report import certificate_figures, tables
 from flownav.report.campaign_figures import Touchdowns
-from flownav.report.html import HERE, drawn_with, template, widened
+from flownav.report.html import HERE, drawn_with, page_of, template, widened
 from flownav.report.panels import NONE, Panel, Section, number
 
 MOST_CELLS = 8  # whose touchdowns are drawn
@@ -143,7 +144,7 @@ def _with_interval(figure: dict[str, float | None]) -> str:
     value, low, high = (figure[name] for name in ("value", "low", "high"))
     if value is None:
         return "-"
-    return f"{value:.3f} ({'?' if low is None else f'{low:.3f}'} to {'?' if high is None else f'{high:.3f}'})"
+    return f"{value:.3f} ({interval_words(low, high)})"
 
 
 def _percent(figure: dict[str, float]) -> str:
@@ -172,9 +173,9 @@ def render_certificate(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> st
         headline=HEADLINES[facts["verdict"]],
         sentence=SENTENCES[facts["verdict"]],
         together=together(facts),
+        chosen=chosen(facts),
         conditions=conditions(facts),
         worst=[worst_of(facts, told) for told in facts["worst"]],
-        measures=[one["measure"] for one in facts["requirement"]["requirements"]],
         axes=[certificate_figures.INPUT_WORDS.get(name, name) for name in facts["envelope"]["axes"]],
         known=certificate_figures.KNOWN_WORDS,
         groups=tables.groups,
@@ -196,7 +197,7 @@ def sections_of(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> list[Sect
     tails = [
         certificate_figures.tail(one, shown["figures"][one["measure"]]) for one in facts["requirement"]["requirements"]
     ]
-    distribution = [certificate_figures.touchdowns(facts, shown), *(panel for panel in tails if panel.figure)]
+    distribution = [certificate_figures.touchdowns(facts, shown), *(panel for panel in tails if panel.drawing)]
     return [
         Section("distribution", "What the flights did", tuple(widened(distribution))),
         Section("envelope-map", "Under which conditions", (certificate_figures.envelope(facts),)),
@@ -217,6 +218,20 @@ def together(facts: Mapping[str, Any]) -> str:
     )
 
 
+CHOSEN = {
+    "seed": "The seed {} was chosen; left alone, it comes of what is asked. Who tries seeds until one passes takes "
+    "more risk than is stated.",
+    "flights": "The number of flights, {}, was chosen; left alone, it is what the plan needs. Other numbers are other "
+    "flights: who tries them until they pass takes more risk than is stated.",
+}
+
+
+def chosen(facts: Mapping[str, Any]) -> list[str]:
+    """What was chosen by hand that a certificate can be had without, in sentences."""
+    given = {name: facts["chosen"][name] for name in CHOSEN}
+    return [CHOSEN[name].format(value) for name, value in given.items() if value is not None]
+
+
 def conditions(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Under what the statement holds: settings, ranges, lists."""
     own = facts["requirement"]
@@ -226,7 +241,7 @@ def conditions(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     for name, entry in given.pop("ranges", {}).items():
         low, high = entry.get("loc", 0.0), entry.get("loc", 0.0) + entry.get("scale", 1.0)
         even = entry["distribution"] == "uniform"
-        said = f"{low:g} to {high:g}, evenly" if even else tables.text(entry)
+        said = f"{low:.15g} to {high:.15g}, evenly" if even else tables.text(entry)
         rows.append((certificate_figures.INPUT_WORDS.get(name, name), said))
     for name, value in given.items():
         if value == []:
@@ -276,4 +291,4 @@ def percent(share: float | None, digits: int = 2) -> str:
 
 def write_envelope(title: str, rows: Sequence[dict[str, Any]], path: Path) -> None:
     """Write the page, whole or not at all; rows as `flownav envelope --json` has them. OSError where it cannot be."""
-    guard.write_page(figures.envelope_figure(title, rows).to_html(include_plotlyjs=True, full_html=True), path)
+    guard.write_page(page_of(title, figures.envelope_figure(title, rows)), path)

@@ -9,7 +9,7 @@ import numpy as np
 from flownav.core.measurement import Array
 from flownav.report.chart import drawn
 from flownav.report.panels import Panel
-from flownav.report.style import COLOUR, FONT, axis, layout, plotly
+from flownav.report.style import COLOUR, FONT, Drawing, axis, drawing, layout
 
 MOST_DOTS = 2500
 FAR_M = 2.0  # from here on distances are drawn on a logarithmic axis
@@ -67,7 +67,7 @@ def over_the_pad(key: str, cell: dict[str, Any], touched: Touchdowns, reach_m: f
     outside = int((np.maximum(abs(touched.north_m[known]), abs(touched.east_m[known])) > reach_m).sum())
     words += f" {outside} touched outside of this map." if outside else ""
     alt = f"Places of first contact of {cell['label']} about the pad's centre"
-    return Panel(key, cell["label"], words, alt, plotly(data, look))
+    return Panel(key, cell["label"], words, alt, drawing(data, look))
 
 
 def tails(cells: Sequence[dict[str, Any]], touched: Sequence[Touchdowns]) -> Panel:
@@ -89,7 +89,7 @@ def tails(cells: Sequence[dict[str, Any]], touched: Sequence[Touchdowns]) -> Pan
     look["xaxis"] |= {"type": "log"} if farthest > FAR_M else {"range": [0.0, 1.05 * farthest]}
     look["yaxis"] = axis("flights beyond (%)") | {"type": "log", "dtick": 1}
     words = "The share of all flights that first touched farther off than this, those that crashed among them."
-    figure = plotly(data, look)
+    figure = drawing(data, look)
     return Panel("tails", "Share beyond a distance", words, "Share of flights beyond a distance from the pad", figure)
 
 
@@ -120,7 +120,7 @@ def convergence(cells: Sequence[dict[str, Any]]) -> Panel | None:
         "Solid: the figure after so many flights; dotted: its 95 % interval, which does not allow for looking often."
     )
     alt = f"{what} against the number of flights"
-    return Panel("convergence", "How it settled", words, alt, plotly(data, look))
+    return Panel("convergence", "How it settled", words, alt, drawing(data, look))
 
 
 def swept_envelopes(cells: Sequence[dict[str, Any]]) -> list[Panel | None]:
@@ -155,25 +155,23 @@ def _swept_envelope(key: str, label: str, own: list[dict[str, Any]]) -> Panel | 
 
 def envelope(key: str, cell: dict[str, Any]) -> Panel | None:
     """The share that landed by the wind's speed and the direction that it blew from."""
-    from plotly.graph_objects import Figure
-
     if not cell["envelope"]:
         return None
     rings = sorted({one["from_m_s"] for one in cell["envelope"]})
     directions = sorted({one["direction_deg"] for one in cell["envelope"]})
     steps = np.diff([*directions, directions[0] + 360.0])
-    figure = Figure()
+    data = []
     for ring in rings:
         own = [one for one in cell["envelope"] if one["from_m_s"] == ring and one["landed"] is not None]
         theta, ends = [one["direction_deg"] for one in own], [one["to_m_s"] for one in own]
         said, share = [_wind_words(one) for one in own], [one["landed"] for one in own]
-        figure.add_trace(_ring(ring, ends, theta, float(steps.min()), share, said))
+        data.append(_ring(ring, ends, theta, float(steps.min()), share, said))
     quiet = {"gridcolor": COLOUR["grid"], "tickfont": {"color": COLOUR["muted"]}, "linecolor": COLOUR["rule"]}
     low = min((one["landed"] for one in cell["envelope"] if one["landed"] is not None), default=0.0)
-    figure.update_layout(
+    look = (
         layout(420)
         | {
-            "template": {}, "hovermode": "closest",
+            "hovermode": "closest",
             "coloraxis": {"colorscale": SCALE, "cmin": min(low, 0.9), "cmax": 1.0,
                           "colorbar": {"title": {"text": "landed"}, "tickformat": ".0%", "thickness": 12}},
             "polar": {"bgcolor": "rgba(0,0,0,0)",
@@ -182,7 +180,7 @@ def envelope(key: str, cell: dict[str, Any]) -> Panel | None:
         }
     )  # fmt: skip
     words = "Share that landed, by the wind at 20 ft and where it blew from (north is up)."
-    return Panel(key, cell["label"], words, f"Share landed by the wind of {cell['label']}", figure)
+    return Panel(key, cell["label"], words, f"Share landed by the wind of {cell['label']}", drawing(data, look))
 
 
 def sensitivity(key: str, cell: dict[str, Any]) -> Panel | None:
@@ -204,7 +202,9 @@ def sensitivity(key: str, cell: dict[str, Any]) -> Panel | None:
     look["xaxis"] = axis("rank correlation with how far off it touched")
     look["yaxis"] = axis() | {"automargin": True, "nticks": len(told)}
     words = "The twelve strongest of Spearman's rank correlations, with 95 % intervals; grey: it may be nothing."
-    return Panel(key, cell["label"], words, f"Rank correlations of the inputs of {cell['label']}", plotly([bars], look))
+    return Panel(
+        key, cell["label"], words, f"Rank correlations of the inputs of {cell['label']}", drawing([bars], look)
+    )
 
 
 def swept_numbers(cells: Sequence[dict[str, Any]]) -> list[str]:
@@ -237,22 +237,20 @@ def over_a_sweep(cells: Sequence[dict[str, Any]], name: str) -> Panel:
     look = layout(360)
     look["xaxis"], look["yaxis"] = axis(name), axis(words)
     key = f"sweep-{name.replace('.', '-')}"
-    return Panel(key, name, "Bars: 95 % intervals.", f"{words} over {name}", plotly(data, look), wide=True)
+    return Panel(key, name, "Bars: 95 % intervals.", f"{words} over {name}", drawing(data, look), wide=True)
 
 
 def _ring(
     inner: float, outer: Sequence[float], theta: Sequence[float], width: float, share: Sequence[float],
     words: Sequence[str],
-) -> Any:  # fmt: skip
+) -> dict[str, Any]:  # fmt: skip
     """Sectors between two radii, coloured by the share that landed."""
-    from plotly.graph_objects import Barpolar
-
     line = {"color": COLOUR["surface"], "width": 1}
-    return Barpolar(
-        base=[inner] * len(theta), r=[end - inner for end in outer], theta=theta, width=[width] * len(theta),
-        marker={"color": share, "coloraxis": "coloraxis", "line": line}, hovertext=words, hoverinfo="text",
-        showlegend=False,
-    )  # fmt: skip
+    return {
+        "type": "barpolar", "base": [inner] * len(theta), "r": [end - inner for end in outer], "theta": theta,
+        "width": [width] * len(theta), "marker": {"color": share, "coloraxis": "coloraxis", "line": line},
+        "hovertext": words, "hoverinfo": "text", "showlegend": False,
+    }  # fmt: skip
 
 
 def _wind_words(one: dict[str, Any]) -> str:
@@ -263,28 +261,28 @@ def _wind_words(one: dict[str, Any]) -> str:
     )
 
 
-def envelope_figure(title: str, rows: Sequence[dict[str, Any]]) -> Any:
+def envelope_figure(title: str, rows: Sequence[dict[str, Any]]) -> Drawing:
     """A ring for each speed, a sector for each direction that the wind blows from; north is up."""
-    from plotly.graph_objects import Figure
-
     speeds = sorted({row["speed_20ft_m_s"] for row in rows})
     directions = sorted({row["from_direction_deg"] for row in rows})
-    figure, inner = Figure(), 0.0
+    data, inner = [], 0.0
     for speed in speeds:
         ring = [row for row in rows if row["speed_20ft_m_s"] == speed]
         theta, share = [row["from_direction_deg"] for row in ring], [row["success"]["rate"] for row in ring]
         width, said = 360.0 / len(directions), [_words(row) for row in ring]
-        figure.add_trace(_ring(inner, [speed] * len(ring), theta, width, share, said))
+        data.append(_ring(inner, [speed] * len(ring), theta, width, share, said))
         inner = speed
-    figure.update_layout(
-        title={"text": title},
-        font={"family": FONT, "color": COLOUR["ink"]},
-        coloraxis={"colorscale": SCALE, "cmin": 0.0, "cmax": 1.0,
-                   "colorbar": {"title": {"text": "landed"}, "tickformat": ".0%"}},
-        polar={"angularaxis": {"rotation": 90, "direction": "clockwise", "ticksuffix": "°"},
-               "radialaxis": {"ticksuffix": " m/s", "angle": 90}},
-    )  # fmt: skip
-    return figure
+    quiet = {"gridcolor": "white", "linecolor": "white", "ticks": ""}
+    look = {
+        "title": {"text": title, "x": 0.05},
+        "font": {"family": FONT, "color": COLOUR["ink"]},
+        "coloraxis": {"colorscale": SCALE, "cmin": 0.0, "cmax": 1.0,
+                      "colorbar": {"title": {"text": "landed"}, "tickformat": ".0%", "outlinewidth": 0, "ticks": ""}},
+        "polar": {"bgcolor": "#E5ECF6",
+                  "angularaxis": {"rotation": 90, "direction": "clockwise", "ticksuffix": "°", **quiet},
+                  "radialaxis": {"ticksuffix": " m/s", "angle": 90, **quiet}},
+    }  # fmt: skip
+    return drawing(data, look)
 
 
 def _words(row: dict[str, Any]) -> str:

@@ -10,7 +10,7 @@ from flownav.core.measurement import Array
 from flownav.report.campaign_figures import DIRECTION, SPEED
 from flownav.report.chart import drawn
 from flownav.report.panels import Panel
-from flownav.report.style import COLOUR, axis, layout
+from flownav.report.style import COLOUR, Drawing, axis, drawing, layout
 
 INPUT_WORDS = {SPEED: "wind at 20 ft (m/s)", DIRECTION: "wind from (°)"}
 KNOWN_WORDS = {
@@ -35,37 +35,35 @@ def touchdowns(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> Panel:
     key, title = "touchdowns", "Touchdowns"
     if not shown["places"]:
         return Panel(key, title, absent="The requirement is not of touchdowns.")
-    from plotly.graph_objects import Figure
-
     north, east, bad = shown["north_m"], shown["east_m"], shown["failed"]
     touched = np.isfinite(north) & np.isfinite(east)
-    figure = Figure()
+    data: list[dict[str, Any]] = []
     for name, radius, role, dash in _circles(facts, shown):
         turn = np.linspace(0.0, 2.0 * np.pi, 121)
-        figure.add_scatter(x=drawn(radius * np.sin(turn)), y=drawn(radius * np.cos(turn)), mode="lines", name=name,
-                           hoverinfo="skip", line={"color": COLOUR[role], "width": 1.6, "dash": dash})  # fmt: skip
+        line = {"color": COLOUR[role], "width": 1.6, "dash": dash}
+        data.append({"type": "scatter", "x": drawn(radius * np.sin(turn)), "y": drawn(radius * np.cos(turn)),
+                     "mode": "lines", "name": name, "hoverinfo": "skip", "line": line})  # fmt: skip
     for name, role, symbol, size, which in (
         ("met", "estimate", "circle", 4, touched & ~bad), ("not met", "alert", "x", 7, touched & bad),
     ):  # fmt: skip
         place = np.flatnonzero(which)
         place = place[:: -(-len(place) // MOST_DOTS)] if role == "estimate" and len(place) else place
         if len(place):
-            figure.add_scatter(x=drawn(east[place]), y=drawn(north[place]), mode="markers", name=name,
-                               hovertemplate="north %{y:.3f} m, east %{x:.3f} m<extra></extra>",
-                               marker={"color": COLOUR[role], "size": size, "symbol": symbol,
-                                       "opacity": 0.6})  # fmt: skip
+            marker = {"color": COLOUR[role], "size": size, "symbol": symbol, "opacity": 0.6}
+            data.append({"type": "scatter", "x": drawn(east[place]), "y": drawn(north[place]), "mode": "markers",
+                         "name": name, "hovertemplate": "north %{y:.3f} m, east %{x:.3f} m<extra></extra>",
+                         "marker": marker})  # fmt: skip
     away = np.hypot(north[touched], east[touched])
     far = 1.15 * _far(away, [radius for _, radius, _, _ in _circles(facts, shown)])
     north_axis = axis("north (m)") | {"scaleanchor": "x", "scaleratio": 1, "range": [-far, far]}
     east_axis = axis("east (m)") | {"range": [-far, far], "constrain": "domain"}
-    figure.update_layout(template="none", **layout(460), xaxis=east_axis, yaxis=north_axis)
-    figure.update_layout(hovermode="closest")
+    look = layout(460) | {"xaxis": east_axis, "yaxis": north_axis, "hovermode": "closest"}
     without, beyond = int((~touched).sum()), int((away > far).sum())
     caption = f"{'At rest' if shown['of'] == 'rest' else 'First contact'}, about the pad's centre."
     caption += f" Without a touchdown that counts: {without} of {len(north)} flights." if without else ""
     caption += f" {beyond} lie beyond the picture; zoom out to see them." if beyond else ""
     alt = f"Scatter of {int(touched.sum())} touchdowns about the pad's centre; {int(bad.sum())} flights do not meet it."
-    return Panel(key, title, caption, alt, figure)
+    return Panel(key, title, caption, alt, drawing(data, look))
 
 
 def _far(figures: Array, marks: Sequence[float]) -> float:
@@ -91,24 +89,22 @@ def _circles(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> list[tuple[s
 
 def tail(one: Mapping[str, Any], figures: Array) -> Panel:
     """How often a measure is exceeded, on a logarithmic scale, beside its limit and the share that may exceed it."""
-    key, title = f"tail-{one['measure'].replace('.', '-')}", f"How often {one['measure']} is exceeded"
+    key, title = f"tail-{one['measure'].replace('.', '-')}", f"How often is it exceeded: {one['words']}"
     upper = "at_most" in one
     if not upper:
-        title = f"How often {one['measure']} is not reached"
+        title = f"How often is it not reached: {one['words']}"
     limit, bound = one["at_most" if upper else "at_least"], one["tolerance_bound"]
     finite = np.sort(figures[np.isfinite(figures)])
     if len(np.unique(finite)) < 3:
         return Panel(key, title, absent=f"{one['measure']} is yes or no: there is no distribution to draw.")
-    from plotly.graph_objects import Figure
-
     count = len(figures)
     beyond = (count - 1 - np.arange(len(finite))) / count if upper else np.arange(len(finite)) / count
     kept = np.unique(np.round(np.concatenate([np.linspace(0, len(finite) - 1, 400), _last(finite, upper)])).astype(int))
     x, y = finite[kept], np.maximum(beyond[kept], 0.3 / count)
-    figure = Figure()
-    figure.add_scatter(x=drawn(x), y=drawn(y), mode="lines", name="flights",
-                       line={"color": COLOUR["estimate"], "width": 1.8},
-                       hovertemplate="%{x:.3f} " + one["unit"] + ": %{y:.2%} beyond<extra></extra>")  # fmt: skip
+    data: list[dict[str, Any]] = []
+    data.append({"type": "scatter", "x": drawn(x), "y": drawn(y), "mode": "lines", "name": "flights",
+                 "line": {"color": COLOUR["estimate"], "width": 1.8},
+                 "hovertemplate": "%{x:.3f} " + one["unit"] + ": %{y:.2%} beyond<extra></extra>"})  # fmt: skip
     ends_x = [min(float(x[0]), limit), max(float(x[-1]), limit)]
     lines = [(f"limit {limit:g} {one['unit']}".rstrip(), "alert", [limit, limit], [0.3 / count, 1.0], "solid"),
              (f"may be beyond: {100 * (1 - one['probability']):.3g} %", "muted", ends_x,
@@ -118,18 +114,18 @@ def tail(one: Mapping[str, Any], figures: Array) -> Panel:
             (f"tolerance bound {bound:.3f} {one['unit']}".rstrip(), "flow", [bound, bound], [0.3 / count, 1.0], "dot")
         )
     for name, role, at_x, at_y, dash in lines:
-        figure.add_scatter(x=at_x, y=at_y, mode="lines", name=name, hoverinfo="skip",
-                           line={"color": COLOUR[role], "width": 1.5, "dash": dash})  # fmt: skip
-    scale = axis("share of flights beyond") | {"type": "log", "tickformat": "~p", "dtick": 1, "nticks": None}
-    figure.update_layout(template="none", **layout(430), yaxis=scale)
+        data.append({"type": "scatter", "x": at_x, "y": at_y, "mode": "lines", "name": name, "hoverinfo": "skip",
+                     "line": {"color": COLOUR[role], "width": 1.5, "dash": dash}})  # fmt: skip
+    scale = axis("share of flights beyond") | {"type": "log", "tickformat": "~p", "dtick": 1, "nticks": 0}
     across = axis(one["words"] + (f" ({one['unit']})" if one["unit"] else ""))
     if float(finite.min()) >= 0.0:
         across["range"] = [0.0, 1.1 * _far(finite, [limit] if bound is None else [limit, bound])]
-    figure.update_layout(xaxis=across, hovermode="closest")
+    look = layout(430) | {"xaxis": across, "yaxis": scale, "hovermode": "closest"}
     caption = "The curve must pass below the corner of the two lines; the tolerance bound is where it surely does."
     infinite = int((~np.isfinite(figures)).sum())
     caption += f" Flights without a figure, which count as beyond all: {infinite}." if infinite else ""
-    return Panel(key, title, caption, f"Share of flights in which {one['measure']} is beyond a value.", figure)
+    alt = f"Share of flights in which it is beyond a value: {one['words']}."
+    return Panel(key, title, caption, alt, drawing(data, look))
 
 
 def _last(finite: Array, upper: bool) -> NDArray[np.int64]:
@@ -147,13 +143,11 @@ def envelope(facts: Mapping[str, Any]) -> Panel:
         return Panel(
             key, title, absent="Nothing in the conditions has a range: the statement holds for the cells below."
         )
-    from plotly.graph_objects import Figure
-
-    figure = Figure()
+    data: list[dict[str, Any]] = []
     polar = axes == [SPEED, DIRECTION]
     for words, role, test in FIELDS:
         inside = [field for field in fields if field["flights"] and test(field)]
-        figure.add_trace(_fields(axes, inside, words, COLOUR[role], polar))
+        data.append(_fields(axes, inside, words, COLOUR[role], polar))
     look = layout(470)
     if polar:
         look["polar"] = {
@@ -168,8 +162,7 @@ def envelope(facts: Mapping[str, Any]) -> Panel:
     else:
         look |= {"xaxis": axis(INPUT_WORDS.get(axes[0], axes[0])),
                  "yaxis": axis("share of flights that meet it") | {"tickformat": ".1%"}}  # fmt: skip
-    figure.update_layout(template="none", barmode="overlay", **look)
-    figure.update_layout(hovermode="closest")
+    look |= {"barmode": "overlay", "hovermode": "closest"}
     smallest = min(field["flights"] for field in fields)
     need = found["flights_needed_in_a_field"]
     caption = (
@@ -178,20 +171,21 @@ def envelope(facts: Mapping[str, Any]) -> Panel:
     if smallest < need:
         caption += f" A field alone needs {need} flights to pass; the emptiest has {smallest}."
     caption += " Direction is where the wind blows from." if polar else ""
-    return Panel(key, title, caption, f"Verdicts of {len(fields)} fields over {' and '.join(axes)}.", figure, wide=True)
+    alt = f"Verdicts of {len(fields)} fields over {' and '.join(axes)}."
+    return Panel(key, title, caption, alt, drawing(data, look), wide=True)
 
 
-def _fields(axes: Sequence[str], fields: Sequence[Mapping[str, Any]], words: str, colour: str, polar: bool) -> Any:
+def _fields(
+    axes: Sequence[str], fields: Sequence[Mapping[str, Any]], words: str, colour: str, polar: bool
+) -> dict[str, Any]:
     """The fields of one kind as bars that stand on their lower edge."""
-    from plotly.graph_objects import Bar, Barpolar
-
     marker = {"color": colour, "opacity": 0.7, "line": {"color": COLOUR["surface"], "width": 1.5}}
     said = [_field_words(axes, field) for field in fields]
+    shared = {"name": words, "hovertext": said, "hoverinfo": "text", "marker": marker}
     if polar:
         low, turn = [np.array([field[name] for field in fields]).reshape(-1, 2) for name in axes]
-        return Barpolar(base=low[:, 0].tolist(), r=np.diff(low).ravel().tolist(), theta=turn.mean(axis=1).tolist(),
-                        width=np.diff(turn).ravel().tolist(), name=words, hovertext=said, hoverinfo="text",
-                        marker=marker)  # fmt: skip
+        return shared | {"type": "barpolar", "base": low[:, 0].tolist(), "r": np.diff(low).ravel().tolist(),
+                         "theta": turn.mean(axis=1).tolist(), "width": np.diff(turn).ravel().tolist()}  # fmt: skip
     first = np.array([field[axes[0]] for field in fields]).reshape(-1, 2)
     across: dict[str, Any] = {"x": first.mean(axis=1).tolist(), "width": np.diff(first).ravel().tolist()}
     if len(axes) == 2:
@@ -203,7 +197,7 @@ def _fields(axes: Sequence[str], fields: Sequence[Mapping[str, Any]], words: str
         bars = {"type": "data", "symmetric": False, "array": (high - share).tolist(),
                 "arrayminus": (share - low).tolist(), "color": COLOUR["ink"], "thickness": 1}  # fmt: skip
         across |= {"y": share.tolist(), "error_y": bars}
-    return Bar(**across, name=words, hovertext=said, hoverinfo="text", marker=marker)
+    return shared | {"type": "bar", **across}
 
 
 def _field_words(axes: Sequence[str], field: Mapping[str, Any]) -> str:
@@ -254,23 +248,19 @@ def _broken(name: str) -> str:
     return f"{front}.<br>{last}" if dot and len(name) > 22 else name
 
 
-def _bars(rows: Sequence[Mapping[str, Any]], height_px: int) -> Any:
+def _bars(rows: Sequence[Mapping[str, Any]], height_px: int) -> Drawing:
     """Total and first index of each row as horizontal bars with intervals, the largest on top."""
-    from plotly.graph_objects import Figure
-
-    figure = Figure()
+    data: list[dict[str, Any]] = []
     for which, role in (("first", "estimate"), ("total", "pad")):
         value = np.clip([row[which] for row in rows], 0.0, 1.0)  # an index is a share; estimates scatter beyond
         low, high = np.clip(np.array([row[f"{which}_interval"] for row in rows]).T, 0.0, 1.0)
         bars = {"type": "data", "symmetric": False, "array": np.maximum(high - value, 0.0).tolist(),
                 "arrayminus": np.maximum(value - low, 0.0).tolist(), "color": COLOUR["ink"],
                 "thickness": 1, "width": 3}  # fmt: skip
-        figure.add_bar(x=value.tolist(), y=[row["name"] for row in rows], orientation="h", name=which,
-                       marker={"color": COLOUR[role]}, error_x=bars,
-                       hovertemplate="%{y}: " + which + " %{x:.3f}<extra></extra>")  # fmt: skip
-    names = axis() | {"autorange": "reversed", "automargin": True, "nticks": None, "ticks": ""}
-    figure.update_layout(template="none", barmode="group", bargap=0.35, bargroupgap=0.08, **layout(height_px))
-    figure.update_layout(
-        xaxis=axis("share of the outcome's variance") | {"rangemode": "tozero"}, yaxis=names, hovermode="closest"
-    )
-    return figure
+        data.append({"type": "bar", "x": value.tolist(), "y": [row["name"] for row in rows], "orientation": "h",
+                     "name": which, "marker": {"color": COLOUR[role]}, "error_x": bars,
+                     "hovertemplate": "%{y}: " + which + " %{x:.3f}<extra></extra>"})  # fmt: skip
+    look = layout(height_px) | {"barmode": "group", "bargap": 0.35, "bargroupgap": 0.08, "hovermode": "closest"}
+    look["xaxis"] = axis("share of the outcome's variance") | {"rangemode": "tozero"}
+    look["yaxis"] = axis() | {"autorange": "reversed", "automargin": True, "nticks": 0, "ticks": ""}
+    return drawing(data, look)

@@ -139,7 +139,7 @@ def _over_each_other(named: Named, errors: Errors, window: Window) -> list[Panel
             if measure in one:
                 stack.line(row, role_of(k), name, *one[measure])
     stack.from_zero()
-    caption = "Length of the error of what was flown on, or else of the estimate, against the truth, or else GPS."
+    caption = "Length of the error of the autopilot's input, or else of the estimate, against the truth, or else GPS."
     return [Panel("errors-all", "Errors", caption, caption, stack.chart(window), wide=True)]
 
 

@@ -1,5 +1,6 @@
 """The words and tables of the report: headline, scores, events, parameters. Scores are shown, never computed."""
 
+import math
 import re
 from collections.abc import Mapping
 from pathlib import PurePath
@@ -14,6 +15,7 @@ from flownav.report.panels import NONE, Part, Tile, metres, number
 from flownav.report.series import has, readings
 
 UNIT_AFTER_NUMBER = re.compile(r"(\d) (m/s|m|s)\b")
+AXES = {"x": "north", "y": "east", "z": "height"}
 KINDS = {
     "fly": "A closed-loop simulated flight of {}.",
     "replay": "A recorded flight of {}, fused again.",
@@ -31,7 +33,7 @@ def title(record: Record) -> str:
 def duration_s(record: Record) -> float:
     """The flight's length [s]: as the manifest says, or else as its estimate lasts."""
     stated = record.manifest.get("duration_s")
-    start, end = series.start_end_s(record)
+    start, end = series.whole_s(record)
     return float(stated) if isinstance(stated, (int, float)) else end - start
 
 
@@ -55,7 +57,7 @@ def summary(record: Record) -> str:
         published = mapping(manifest.get("paper")).get("max_position_error_m")
         beside = f" (the paper: {metres(published)} m)" if published is not None else ""
         ever = "No axis of the estimated position was ever"
-        ever = "In flight no axis of the position that was flown on was" if has(record, "flown") else ever
+        ever = "In flight no axis of the position that the autopilot used was" if has(record, "flown") else ever
         said.append(f"{ever} off by more than {metres(largest)} m{beside}.")
     if manifest.get("known_exactly"):
         said.append(f"What the vehicle knew exactly: {manifest['known_exactly']}.")
@@ -92,7 +94,7 @@ def summary(record: Record) -> str:
 def _reference(record: Record) -> str:
     """What errors are taken against, in words: a truth, or an estimate that serves for want of one."""
     name = series.truth_name(record)
-    return "the recorded truth" if name == "truth" else f"the recorded {name}, an estimate itself,"
+    return "the recorded truth" if name == "truth" else f"the recorded {name} (an estimate itself)"
 
 
 def tiles(record: Record) -> list[Tile]:
@@ -101,9 +103,15 @@ def tiles(record: Record) -> list[Tile]:
     found = landing_tiles(mapping(scores.get("touchdown")))
     if scores.get("max_position_error_m") is not None:
         published = paper.get("max_position_error_m")
-        against = "what was flown on" if has(record, "flown") else f"estimate against {series.truth_name(record)}"
-        note = f"paper {metres(published)} m" if published is not None else against
+        against = (
+            "of the autopilot's input" if has(record, "flown") else f"estimate against {series.truth_name(record)}"
+        )
+        note = f"paper {metres(published)} m" if published is not None else f"{against}{_axis_of_largest(scores)}"
         found.append(Tile("Largest error of one axis", metres(scores["max_position_error_m"]), "m", note))
+    turned: list[Any] = [mapping(error).get("rms_error") for error in mapping(scores.get("attitude_deg")).values()]
+    if len(turned) == 3 and all(isinstance(angle, float) for angle in turned):
+        tilt, heading = math.hypot(*turned[:2]), number(turned[2], 2)
+        found.append(Tile("Attitude error", number(tilt, 2), "°", f"rms of roll and pitch; heading {heading}°"))
     cut = series.scored_outages(record)
     if cut:
         worst = max(cut, key=series.rms_m)
@@ -127,14 +135,34 @@ def tiles(record: Record) -> list[Tile]:
     return [*found, Tile(name, f"{100 * share:.0f}", "%", "of the time")]
 
 
+def _axis_of_largest(scores: Mapping[str, Any]) -> str:
+    """Which axis of the position erred most, as words to follow; "" where the scores do not say."""
+    states = mapping(scores.get("states"))
+    errors = {words: mapping(states.get(key)).get("max_error") for key, words in AXES.items()}
+    known = {words: float(value) for words, value in errors.items() if isinstance(value, int | float)}
+    return f": {max(known, key=lambda words: known[words])}" if len(known) == len(AXES) else ""
+
+
 def flow_share(record: Record) -> float | None:
     """Share of the flight with valid flow readings, a gap not counted; None without readings."""
     flow = series.flow_readings(record)
-    start, end = series.start_end_s(record)
+    start, end = series.whole_s(record)
     if flow is None or len(flow.t_s) < 2 or end <= start:
         return None
     interval = np.diff(flow.t_s)
     return float(min(1.0, interval[interval <= 3.0 * np.median(interval)].sum() / (end - start)))
+
+
+def explained(record: Record) -> dict[str, Any]:
+    """What `flownav explain` said of the log: verdict, causes, headings and lines of its table; empty without it."""
+    told = mapping(record.manifest.get("explained"))
+    if not isinstance(told.get("verdict"), str):
+        return {}
+    lines = [[str(cell) for cell in line] for line in told.get("lines") or [] if isinstance(line, list)]
+    return {
+        "verdict": told["verdict"], "found": bool(told.get("causes")),
+        "headings": [str(heading) for heading in told.get("headings") or []], "lines": lines,
+    }  # fmt: skip
 
 
 def lacking(record: Record) -> list[str]:

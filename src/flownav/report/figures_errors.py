@@ -17,7 +17,7 @@ POSITION_ERRORS = ("x error (m)", "y error (m)", "z error (m)")
 VELOCITY_ERRORS = ("u error (m/s)", "v error (m/s)", "w error (m/s)")
 # what errors are taken of: states, titles of the axes, word, unit
 ERRORS = ((POSITION_NED, POSITION_ERRORS, "position", "m"), (VELOCITY_BODY, VELOCITY_ERRORS, "velocity", "m/s"))
-SAID = {"flown": "flown on", "estimate": "estimate"}
+SAID = {"flown": "autopilot's input", "estimate": "estimate"}
 CLOSE, CLOSE_ROOM = 0.9, 1.6  # of the errors after the first fix of the pad, and the room that they get
 USUAL = 0.98  # of what is drawn of errors and bands is inside the axes
 FRAME = "At the filter's own instant and in its own frame, which GPS has put somewhere."
@@ -160,8 +160,8 @@ def flown_errors(record: Record) -> list[Panel]:
         if error is None:
             return []
         figure = _drawn(record, "flown", titles, error).chart(series.start_end_s(record), moments(record))
-        title = f"What was flown on: {what} error"
-        caption = "Until the hand-over the vehicle stands, or is flown on the truth: no error, by definition."
+        title = f"Autopilot's input: {what} error"
+        caption = "Until the hand-over the vehicle stands, or flies on the truth: no error, by definition."
         panels.append(Panel(f"flown-{what}-error", title, caption, f"{title} over time: {', '.join(titles)}.", figure))
     return panels
 

@@ -35,7 +35,7 @@ def radius_of_uncertainty(record: Record) -> Panel:
             spread.append(("gps", "GPS alone", gps and _radius(difference(gps, truth), axes)))
             spread.append(("estimate", "filter", _radius(difference(estimate, truth), axes)))
             flown = track(record, "flown", POSITION_NED)
-            spread.append(("flown", "flown on", flown and _radius(difference(flown, truth), axes)))
+            spread.append(("flown", "autopilot's input", flown and _radius(difference(flown, truth), axes)))
         else:
             spread.append(("gps", "stated for GPS alone", _gps_stated(record, axes)))
         if stated is not None:

@@ -36,7 +36,7 @@ SENSOR_TITLES = {
     "pose": "External position",
     "yaw": "External heading",
     "pad": "Pad fix",
-    "landed": "Skid switch (at rest)",
+    "landed": "Landed signal (at rest)",
 }
 
 

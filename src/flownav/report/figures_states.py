@@ -17,7 +17,10 @@ from flownav.report.series import Track, Window, at, estimates, has, moments, ou
 POSITION_TITLES = ("x, north (m)", "y, east (m)", "z, down (m)")
 VELOCITY_TITLES = ("u, forward (m/s)", "v, right (m/s)", "w, down (m/s)")
 REFERENCE = ("pos_n_ref_m", "pos_e_ref_m", "pos_d_ref_m")
-PLACED = "What is flown on counts from where the vehicle takes its pad to be, the estimate from the filter's origin."
+PLACED = (
+    "The autopilot's input is the navigator's estimate carried to the present; it counts from where the vehicle takes "
+    "its pad to be, the estimate from the filter's origin."
+)
 DOWN = "z is positive down (NED); its axis is drawn upside down, so that up on the page is up."
 
 
@@ -46,6 +49,7 @@ def position(record: Record, view: View = POSITION) -> Panel:
     """Position x, y, z: GPS readings, estimate, truth (figures 17 and 22)."""
     dots = [Source("gps", "GPS", readings(record, Sensor.GPS_POSITION))]
     lines = [Source("command", "reference", track(record, "command", REFERENCE))]
+    lines += [Source("command", "set-point", series.setpoints(record, POSITION_NED))]
     lines += [Source(*source) for source in series.estimates(record, POSITION_NED)]
     note = DOWN if view.with_gps else ""
     note += f" {PLACED}" if has(record, "flown") and view.with_gps else ""
@@ -116,6 +120,8 @@ def attitude(record: Record) -> Panel:
         sources = [("estimate", "attitude sensor", own)]
     if not sources:
         return Panel(key, title, absent="The record holds no attitude.")
+    asked = series.setpoints(record, QUATERNION)
+    sources = sources if asked is None else [("command", "set-point", asked), *sources]
     stack = Stack(("roll (°)", "pitch (°)", "yaw (°)"))
     for role, name, source in sources:
         kept = thin(ATTITUDE_POINTS, *source.value[:, 1:].T)
@@ -174,6 +180,25 @@ def vibration(record: Record) -> list[Panel]:
     )
     chart = stack.chart(series.start_end_s(record), moments(record), outages(record))
     return [Panel("vibration", "Vibration", caption, f"Vibration of the IMU over time. {caption}", chart)]
+
+
+BATTERY = {"voltage_v": "voltage (V)", "current_a": "current (A)", "remaining_percent": "left (%)"}
+
+
+def battery(record: Record) -> list[Panel]:
+    """The battery as the log has it; none where it has no voltage."""
+    told = [name for name in BATTERY if track(record, "battery", (name,)) is not None]
+    known = [name for name in told if np.isfinite(record.tables["battery"][name]).any()]
+    if "voltage_v" not in known:
+        return []
+    stack = Stack([BATTERY[name] for name in known], row_height_px=110)
+    for row, name in enumerate(known, 1):
+        values = np.asarray(record.tables["battery"][name], float)
+        stack.line(row, "imu", "battery", np.asarray(record.tables["battery"]["t_s"], float), values)
+    volts = np.asarray(record.tables["battery"]["voltage_v"], float)
+    caption = f"From {volts[np.isfinite(volts)][0]:.2f} V to {volts[np.isfinite(volts)][-1]:.2f} V."
+    chart = stack.chart(series.start_end_s(record), moments(record), outages(record))
+    return [Panel("battery", "Battery", caption, f"Battery over time. {caption}", chart)]
 
 
 JUMP_M = 0.5  # from one row to the next: what is flown on jumps so far as a pad is found

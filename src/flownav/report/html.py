@@ -5,10 +5,13 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from html import escape
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from flownav.core import guard
+from flownav.core.errors import InputError
 from flownav.core.record import Record, mapping
 from flownav.report import (
     content,
@@ -20,13 +23,17 @@ from flownav.report import (
 )
 from flownav.report.chart import DOT_POINTS, LINE_POINTS
 from flownav.report.figures_states import Paths, paths_of
+from flownav.report.landing import landing_picture
 from flownav.report.page_data import Columns, paths_data, sections_data
 from flownav.report.panels import Panel, Section
 from flownav.report.series import Window, first_pad_fix_s, has, moments, outages, start_end_s
-from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE
+from flownav.report.spectrum import spectrum
+from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE, Drawing
+from flownav.scoring.consistency import meanings
 from flownav.scoring.phases import Phase, phases_of
 
 HERE = Path(__file__).parent
+PLOTLY = "plotly.min.js"
 RECORD_STYLES = ("vendor/uPlot.min.css", "page.css", "record.css")
 RECORD_SCRIPTS = (
     "vendor/uPlot.iife.min.js",
@@ -79,6 +86,7 @@ def _sections(record: Record) -> list[tuple[str, str, list[Panel]]]:
     uncertainty = [figures_filter.radius_of_uncertainty(record), *figures_filter.protection(record)]
     inner = figures_innovation.inner_states(record)
     vehicle = [figures_states.attitude(record), figures_states.controls(record), *figures_states.vibration(record)]
+    vehicle += [*spectrum(record), *figures_states.battery(record)]
     return [
         ("path", "Flight path", [figures_states.path_over_pad(record), figures_states.ground_track(record)]),
         ("close-ups", "Take-off, touchdown and outages", figures_errors.close_ups(record)),
@@ -94,7 +102,9 @@ def _sections(record: Record) -> list[tuple[str, str, list[Panel]]]:
 def render(record: Record) -> str:
     """The page as text."""
     shown = sections(record)
-    found = phases_of(record)
+    from markupsafe import Markup
+
+    found, judged, picture = phases_of(record), tables.sensor_rows(record), landing_picture(record)
     page: str = template("page.html.j2").render(
         title=content.title(record),
         kind=str(record.manifest.get("kind") or "flight"),
@@ -102,18 +112,24 @@ def render(record: Record) -> str:
         has_truth=has(record, "truth"),
         facts=content.facts(record),
         summary=content.summary(record),
+        landing=picture and Markup(picture.svg),
+        landing_words=picture.words if picture else "",
+        many=bool(record.manifest.get("many")),
         tiles=content.tiles(record),
         lacking=content.lacking(record),
+        explained=content.explained(record),
         paper=mapping(record.manifest.get("paper")),
         scores=tables.score_rows(record),
         flown=has(record, "flown"),
         phases=tables.phase_rows(record, found),
         outages=tables.outage_rows(record, found),
-        sensors=tables.sensor_rows(record),
+        sensors=judged,
+        meanings=meanings(row[-1] for row in judged),
         rejected=tables.rejected_rows(record, found),
         thinned=any(len(table["t_s"]) > DOT_POINTS for table in record.tables.values()),
         line_points=LINE_POINTS,
         dot_points=DOT_POINTS,
+        told=tables.autopilot_rows(record, found),
         events=tables.events(record, found),
         parameters=tables.groups(record.manifest.get("parameters")),
         provenance=tables.groups(record.manifest.get("provenance")),
@@ -177,14 +193,13 @@ def heights_px(charts: Mapping[str, Any]) -> dict[str, int]:
 def drawn_with(shown: Sequence[Section]) -> dict[str, Any]:
     """What every page with figures is given: its sections, their data, colours, style, scripts and content policy."""
     from markupsafe import Markup
-    from plotly.offline import get_plotlyjs
 
-    scripts = [get_plotlyjs().replace("\r", ""), (HERE / "page.js").read_text(encoding="utf-8")]
+    scripts = [plotly_script(), (HERE / "page.js").read_text(encoding="utf-8")]
     return {
         "sections": shown,
         "palette": PALETTE,
         "font": Markup(FONT),
-        "data": {one.key: Markup(figure_json(one)) for section in shown for one in section.panels if one.figure},
+        "data": {one.key: Markup(figure_json(one)) for section in shown for one in section.panels if one.drawn},
         "dark": Markup(inside_script(json.dumps(LIGHT_TO_DARK))),
         "style": Markup((HERE / "page.css").read_text(encoding="utf-8")),
         "scripts": [Markup(script) for script in scripts],
@@ -206,9 +221,38 @@ def template(name: str, folder: Path = HERE) -> Any:
     return environment.get_template(name)
 
 
+def plotly_script() -> str:
+    """Plotly's script, which draws in the browser: the wheel brings it, a checkout has it from Plotly's own package.
+
+    InputError where neither is there.
+    """
+    package = find_spec("plotly")
+    folders = [
+        HERE / "vendor",
+        *(Path(place) / "package_data" for place in (package and package.submodule_search_locations) or ()),
+    ]
+    for folder in folders:
+        if (folder / PLOTLY).is_file():
+            return (folder / PLOTLY).read_text(encoding="utf-8").replace("\r", "")
+    raise InputError("this page is drawn by Plotly's script, which a checkout has from: pip install 'flownav[plots]'")
+
+
+def page_of(title: str, drawn: Drawing) -> str:
+    """A page of one drawing that fills it, and of nothing else."""
+    own = "Plotly.newPlot('drawing', ...JSON.parse(document.getElementById('figure').textContent), {responsive: true})"
+    data = inside_script(json.dumps([json.loads(drawn.to_json())[part] for part in ("data", "layout")]))
+    return (
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>\n'
+        f'<style>html, body, #drawing {{ height: 100%; margin: 0 }}</style></head>\n<body><div id="drawing"></div>\n'
+        f'<script type="application/json" id="figure">{data}</script>\n'
+        f"<script>{plotly_script()}</script>\n<script>{own}</script></body></html>\n"
+    )
+
+
 def figure_json(panel: Panel) -> str:
     """A panel's figure as JSON for the page's script."""
-    return inside_script(panel.figure.to_json())
+    assert panel.drawn is not None
+    return inside_script(panel.drawn.to_json())
 
 
 def inside_script(text: str) -> str:

@@ -6,10 +6,20 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from flownav.core.errors import InputError
 from flownav.report.chart import Chart
-from flownav.report.style import figure
+from flownav.report.style import Drawing, figure
 
 NONE, MINUS = "\N{EN DASH}", "\N{MINUS SIGN}"
+
+
+def plotly() -> Any:
+    """Plotly's graph objects. InputError where the package is not installed."""
+    try:
+        import plotly.graph_objects
+    except ImportError:
+        raise InputError("plots in Python need the package plotly: pip install 'flownav[plots]'") from None
+    return plotly.graph_objects
 
 
 @dataclass(frozen=True)
@@ -46,11 +56,18 @@ def metres(value: Any) -> str:
 
 
 @dataclass(frozen=True)
+class Still:
+    """A picture that stands in the page as it is, in its colours (SVG)."""
+
+    svg: str
+
+
+@dataclass(frozen=True)
 class Panel:
     """One figure of a page, or in `absent` the words that say why it is not there.
 
-    caption: what to look for (shown); alt: what is drawn (for screen readers); drawing: a chart over time, or a
-    Plotly figure where it is something else.
+    caption: what to look for (shown); alt: what is drawn (for screen readers); drawing: a chart over time, a
+    picture that stands still, or what Plotly's script draws where it is something else.
     """
 
     key: str
@@ -61,10 +78,24 @@ class Panel:
     absent: str = ""
     wide: bool = False
 
+    @property
+    def still(self) -> Any:
+        """What stands in the page as it is, marked as safe for it; None of other drawings."""
+        from markupsafe import Markup
+
+        return Markup(self.drawing.svg) if isinstance(self.drawing, Still) else None
+
     @cached_property
+    def drawn(self) -> Drawing | None:
+        """What Plotly's script draws; a chart is turned into that. None of what is drawn otherwise, and of nothing."""
+        if isinstance(self.drawing, Chart):
+            return figure(self.drawing)
+        return self.drawing if isinstance(self.drawing, Drawing) else None
+
+    @property
     def figure(self) -> Any:
-        """What is drawn, as a Plotly figure; a chart is turned into one, any other drawing is given as it is."""
-        return figure(self.drawing) if isinstance(self.drawing, Chart) else self.drawing
+        """The same as a figure of Plotly's Python package, for who goes on with it. InputError without the package."""
+        return None if self.drawn is None else plotly().Figure(self.drawn._asdict())
 
 
 @dataclass(frozen=True)

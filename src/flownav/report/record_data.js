@@ -68,11 +68,12 @@ const flight = (() => {
   const styles = getComputedStyle(document.documentElement);
   const colour = (role) => styles.getPropertyValue(`--${role}`).trim();
 
-  // What the whole page shares. `follow` is called with the instant, `fit` when the zoom changes.
-  const shared = { t: 0, zoom: null, followers: [], fitters: [], pending: false };
+  // What the whole page shares. `moved`: somebody chose the instant. `follow` is called with it, `fit` when the zoom changes.
+  const shared = { t: 0, moved: false, zoom: null, followers: [], fitters: [], pending: false };
   function setInstant(t) {
     const { t0, t1 } = shared.facts;
     shared.t = Math.min(t1, Math.max(t0, t));
+    shared.moved = true;
     if (shared.pending) return;
     shared.pending = true;
     requestAnimationFrame(() => {

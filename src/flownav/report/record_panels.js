@@ -233,17 +233,22 @@ const panels = (() => {
       plot.over.addEventListener("dblclick", () => flight.setZoom(null));
     }
 
+    // The place of the last value in sight; -1 where there is none.
+    end(one) {
+      const [from, to] = this.window();
+      let k = flight.before(one.t, to);
+      while (k > 0 && !Number.isFinite(one.v[k]) && one.t[k] > from) k--;
+      return k;
+    }
+
     // Labels beside the ends of their lines, moved apart where they would lie on each other.
     placeEnds(row) {
       if (!this.gutter) return;
       const { plot } = row;
       const top = plot.over.offsetTop;
-      const [from, to] = this.window();
       const places = [...row.labels.values()].map((label) => {
-        const { one } = label;
-        let k = flight.before(one.t, to);
-        while (k > 0 && !Number.isFinite(one.v[k]) && one.t[k] > from) k--;
-        const value = k >= 0 ? one.v[k] + (one.m ? one.m[k] : 0) : NaN;
+        const k = this.end(label.one);
+        const value = k >= 0 ? label.one.v[k] + (label.one.m ? label.one.m[k] : 0) : NaN;
         const y = Number.isFinite(value) && !(row.log && value <= 0) ? plot.valToPos(value, "y") : 0;
         return { label, y: Math.min(plot.over.clientHeight, Math.max(0, y)), high: label.chip.firstChild.textContent && label.value ? 28 : 14 };
       });
@@ -277,9 +282,11 @@ const panels = (() => {
       const inside = t >= from && t <= to;
       row.cursor.style.display = inside ? "" : "none";
       if (inside) row.cursor.style.transform = `translateX(${row.plot.valToPos(t, "x").toFixed(2)}px)`;
+      // Until somebody moves the instant, on paper and where it is out of sight a label has its curve's last value.
+      const still = !flight.moved || !inside || document.documentElement.classList.contains("paper");
       for (const { one, value } of row.labels.values()) {
         if (!value) continue;
-        const here = flight.nearest(one.t, one.v, t);
+        const here = still ? (this.end(one) < 0 ? NaN : one.v[this.end(one)]) : flight.nearest(one.t, one.v, t);
         value.textContent = `${one.kind === "band" && Number.isFinite(here) ? "\u00b1" : ""}${flight.number(here)}`;
       }
     }

@@ -10,15 +10,17 @@ import numpy as np
 
 from flownav.core.measurement import COLUMNS, Array, Sensor
 from flownav.core.record import QUATERNION, Record, mapping
+from flownav.scoring import errors
 from flownav.scoring.phases import phases_of
 
 Window = tuple[float, float]
 
 
-ESTIMATES = (("autopilot", "autopilot"), ("smoothed", "smoothed"), ("flown", "flown on"), ("estimate", "estimate"),
-             ("truth", "truth"))  # tables and what they are called  # fmt: skip
+ESTIMATES = (("autopilot", "autopilot"), ("smoothed", "smoothed"), ("flown", "autopilot's input"),
+             ("estimate", "estimate"), ("truth", "truth"))  # tables and what they are called  # fmt: skip
 TRUTHS = ("", "truth.csv", "the simulator")  # references that are one; any other is an estimate itself
 LIFT_OFF_KINDS = ("lift-off", "lift_off", "takeoff")
+AFTER_REST_S = 2.0
 TOUCHDOWN_KINDS = ("touchdown",)
 
 
@@ -61,6 +63,15 @@ def estimates(record: Record, columns: tuple[str, ...]) -> list[tuple[str, str, 
     names = dict(ESTIMATES) | {"truth": truth_name(record)}
     found = [(role, name, track(record, role, columns)) for role, name in names.items()]
     return [(role, name, source) for role, name, source in found if source is not None]
+
+
+def setpoints(record: Record, columns: tuple[str, ...]) -> Track | None:
+    """What an autopilot asked for of these states, where it did; None where it never did."""
+    asked = track(record, "setpoint", columns)
+    if asked is None:
+        return None
+    some = np.isfinite(asked.value).any(axis=1)
+    return Track(asked.t_s[some], asked.value[some]) if some.any() else None
 
 
 def truth_name(record: Record) -> str:
@@ -141,10 +152,8 @@ def gps_velocity_body(record: Record) -> Track | None:
 
 
 def euler_deg(attitude: Track) -> Array:
-    """Roll, pitch, yaw [deg] of a track of quaternions, shape (n, 3), one row at a time: thin it first."""
-    from flownav.core.frames import euler_from_quaternion
-
-    return np.asarray(np.degrees([euler_from_quaternion(*row) for row in attitude.value])).reshape(-1, 3)
+    """Roll, pitch, yaw [deg] of a track of quaternions, shape (n, 3)."""
+    return errors.euler_deg(*attitude.value.T).T
 
 
 def first_pad_fix_s(record: Record) -> float | None:
@@ -222,6 +231,14 @@ def _text(cell: Any) -> str:
 
 
 def start_end_s(record: Record) -> Window:
+    """What the axes show [s]: the flight, to AFTER_REST_S after a scored landing came to rest."""
+    start, end = whole_s(record)
+    landing = mapping(mapping(record.manifest.get("scores")).get("touchdown"))
+    rest_s = mapping(landing.get("rest")).get("t_s")
+    return (start, min(end, rest_s + AFTER_REST_S)) if isinstance(rest_s, float) else (start, end)
+
+
+def whole_s(record: Record) -> Window:
     """First and last instant [s] of the estimate, or of whatever the record holds; (0, 0) of an empty one."""
     tables = [record.tables["estimate"]] if has(record, "estimate") else list(record.tables.values())
     times = [np.asarray(table["t_s"], float) for table in tables if len(table["t_s"])]

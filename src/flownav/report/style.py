@@ -2,17 +2,21 @@
 
 Each colour has a light and a dark value. Figures are built with the light ones; the page's script swaps
 them where the reader's system asks for dark, so a role (truth, estimate, ...) has one colour everywhere.
-A chart becomes a Plotly figure here: each name appears once in the legend and switches all its traces.
+A chart becomes what Plotly's script draws here: each name appears once in the legend and switches all its traces.
+Plotly's own Python package is not needed for that: the script takes JSON.
 """
 
-from collections.abc import Sequence
+import base64
+import json
+from collections.abc import Mapping, Sequence
 from html import escape
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.measurement import Array
+from flownav.core.text import finite
 from flownav.report.chart import (
     CROSS_POINTS,
     DOT_POINTS,
@@ -129,17 +133,43 @@ GAP_PX = 22
 LEAST_SPAN = 1e-6  # an axis whose values differ by less is kept from magnifying their rounding
 
 
-def figure(chart: Chart) -> Any:
-    """The figure, built and checked by Plotly once."""
+class Drawing(NamedTuple):
+    """Traces and a layout as Plotly's script takes them (plotly.com/javascript/reference); columns are arrays."""
+
+    data: list[dict[str, Any]]
+    layout: dict[str, Any]
+
+    def to_json(self) -> str:
+        """Both as JSON: an array as its bytes (`dtype`, `bdata`), a number that is none as null."""
+        return json.dumps(finite(_packed(self._asdict())), allow_nan=False)
+
+
+TYPED = {"float64": "f8", "float32": "f4", "int32": "i4", "uint8": "u1"}  # what plotly.js reads from bytes
+
+
+def _packed(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _packed(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_packed(one) for one in value]
+    if isinstance(value, np.ndarray) and value.dtype.name in TYPED:
+        little = np.ascontiguousarray(value, value.dtype.newbyteorder("<"))
+        said = {"dtype": TYPED[value.dtype.name], "bdata": base64.b64encode(little.tobytes()).decode()}
+        return said | ({"shape": ", ".join(map(str, value.shape))} if value.ndim > 1 else {})
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
+def figure(chart: Chart) -> Drawing:
+    """What is drawn of a chart."""
     data: list[dict[str, Any]] = []
     named: set[str] = set()
     for row, one_axis in enumerate(chart.axes, 1):
         for one in one_axis.series:
             first = one.name not in named
             named.add(one.name)
-            place = {"xaxis": f"x{row}", "yaxis": f"y{row}", "legendgroup": one.name, "showlegend": first}
+            place = {"xaxis": f"x{_nth(row)}", "yaxis": f"y{_nth(row)}", "legendgroup": one.name, "showlegend": first}
             data.append({"type": "scatter", "name": one.name, **place, **TRACES[one.kind](one)})
-    return plotly(data, _layout(chart))
+    return drawing(data, _layout(chart))
 
 
 def _line(one: Series) -> dict[str, Any]:
@@ -186,6 +216,11 @@ def _band(one: Series) -> dict[str, Any]:
 TRACES = {"line": _line, "dots": _dots, "crosses": _crosses, "band": _band}
 
 
+def _nth(row: int) -> str:
+    """The first axis has no number."""
+    return "" if row == 1 else str(row)
+
+
 def _layout(chart: Chart) -> dict[str, Any]:
     count = len(chart.axes)
     made = layout(FRAME_HEIGHT_PX + count * chart.row_height_px) | {"shapes": [], "annotations": []}
@@ -193,10 +228,10 @@ def _layout(chart: Chart) -> dict[str, Any]:
     height = (1.0 - gap * (count - 1)) / count
     for row, one in enumerate(chart.axes, 1):
         top, last = 1.0 - (row - 1) * (height + gap), row == count
-        across = {"anchor": f"y{row}", "showticklabels": last, "matches": None if row == 1 else "x"}
-        made[f"xaxis{row}"] = axis("time (s)" if last else "") | across | {"range": list(chart.window)}
+        across = {"anchor": f"y{_nth(row)}", "showticklabels": last, "range": list(chart.window)}
+        made[f"xaxis{_nth(row)}"] = axis("time (s)" if last else "") | across | ({"matches": "x"} if row > 1 else {})
         domain = [max(0.0, top - height), min(1.0, top)]
-        upright = axis(escape(one.title, quote=False)) | {"anchor": f"x{row}", "domain": domain, "nticks": 6}
+        upright = axis(escape(one.title, quote=False)) | {"anchor": f"x{_nth(row)}", "domain": domain, "nticks": 6}
         if one.log:
             upright |= {"type": "log", "dtick": 1, "exponentformat": "none"}
         if one.reversed:
@@ -208,7 +243,7 @@ def _layout(chart: Chart) -> dict[str, Any]:
         smallest, largest = one.reach()
         if largest - smallest < LEAST_SPAN:
             upright |= {"range": [smallest - 1.0, largest + 1.0], "autorange": False}
-        made[f"yaxis{row}"] = upright
+        made[f"yaxis{_nth(row)}"] = upright
     _shade(made, chart.outages)
     for moment in chart.moments:
         line = {"color": COLOUR["muted"], "width": 1, "dash": "2px,2px"}
@@ -236,8 +271,6 @@ def _note(made: dict[str, Any], t_s: float, text: str) -> None:
     made["annotations"].append(place | {"text": text, "showarrow": False, "font": font})
 
 
-def plotly(data: Sequence[Any], look: dict[str, Any]) -> Any:
-    """A Plotly figure of traces in this layout alone, without a template's."""
-    from plotly.graph_objects import Figure
-
-    return Figure({"data": list(data), "layout": {"template": {}, **look}})
+def drawing(data: Sequence[dict[str, Any]], look: dict[str, Any]) -> Drawing:
+    """Traces in this layout alone, without a template's."""
+    return Drawing(list(data), {"template": {}, **{name: value for name, value in look.items() if value is not None}})

@@ -17,6 +17,7 @@ from flownav.scoring.recorded import rejected_mostly_in, scores_by_phase
 EVENTS_LISTED = 300
 
 
+ATTITUDE = {"roll": ("right down", "°"), "pitch": ("nose up", "°"), "yaw": ("heading", "°")}
 STATES = {"x": ("north", "m"), "y": ("east", "m"), "z": ("down", "m"),
           "u": ("forward", "m/s"), "v": ("right", "m/s"), "w": ("down", "m/s")}  # fmt: skip
 
@@ -34,10 +35,11 @@ class ScoreRow:
 
 def score_rows(record: Record) -> list[ScoreRow]:
     """One row for each scored state."""
-    states = mapping(mapping(record.manifest.get("scores")).get("states"))
+    scores = mapping(record.manifest.get("scores"))
+    states = {**mapping(scores.get("states")), **mapping(scores.get("attitude_deg"))}
     published = mapping(mapping(record.manifest.get("paper")).get("states"))
     rows = []
-    for key, (direction, unit) in STATES.items():
+    for key, (direction, unit) in (STATES | ATTITUDE).items():
         mine, theirs = mapping(states.get(key)), mapping(published.get(key))
         if mine:
             mean, std, rms, largest = (number(mine.get(f"{kind}_error")) for kind in ("mean", "std", "rms", "max"))
@@ -94,6 +96,18 @@ def events(record: Record, phases: Sequence[Phase] = ()) -> EventTables:
     listed = [Event(t_s, (source, kind, detail, value), phase_at(where, t_s))
               for t_s, source, kind, detail, value in rows[:EVENTS_LISTED]]  # fmt: skip
     return EventTables(counted, listed, len(rows))
+
+
+TOLD_LISTED = 200
+
+
+def autopilot_rows(record: Record, phases: Sequence[Phase] = ()) -> list[Event]:
+    """What an autopilot's log tells besides its sensors, in order of time: modes, messages, parameters set in it."""
+    where = list(phases)
+    return [
+        Event(t_s, (source, kind, detail, value), phase_at(where, t_s))
+        for t_s, source, kind, detail, value in series.event_rows(record) if source == "autopilot"
+    ][:TOLD_LISTED]  # fmt: skip
 
 
 def groups(tree: Any) -> list[tuple[str, list[tuple[str, str]]]]:
@@ -178,10 +192,10 @@ def sensor_rows(record: Record) -> list[tuple[str, str, str, str, str]]:
     rows = []
     for name in dict.fromkeys([*spans, *judged]):
         span, found = mapping(spans.get(name)), mapping(judged.get(name))
-        heard = f"{number(span.get('t0'), 1)} to {number(span.get('t1'), 1)}" if span else NONE
+        span_s = f"{number(span.get('t0'), 1)} to {number(span.get('t1'), 1)}" if span else NONE
         mean, tested, said = NONE, NONE, ""
         if found:
             mean, tested = number(found.get("nis_per_dof"), 2), f"{found.get('samples') or 0:,}"
             said = verdict(float(found.get("nis_per_dof") or 0.0), white=bool(found.get("white")))
-        rows.append((SENSOR_TITLES.get(name, name.replace("_", " ")), heard, tested, mean, said))
+        rows.append((SENSOR_TITLES.get(name, name.replace("_", " ")), span_s, tested, mean, said))
     return rows

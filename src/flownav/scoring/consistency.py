@@ -10,7 +10,7 @@ Sums, not flights, are kept: memory does not grow with the number of flights.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
@@ -147,16 +147,30 @@ def lag_one(normalised: Array) -> float:
     return float(np.sum(normalised[1:] * normalised[:-1])) / power if power > 0.0 else 0.0
 
 
+SMALLER, LARGER, LASTING = "smaller than stated", "larger than stated", "each like the last"
+MEANING = {
+    SMALLER: "safe to fly on, since no band is too narrow; the sensor could be trusted more: state a smaller noise.",
+    LARGER: "the sensor is trusted too much and bands are too narrow: state a larger noise, or see `flownav explain`.",
+    LASTING: "a bias, a wrong delay or slow noise stays in it: averaging helps less than the bands say.",
+}  # what each of these says of an estimate's use, and what to do about it
+
+
 def verdict(nis_per_dof: float, *, white: bool) -> str:
-    """What a sensor's innovations say of the filter, in words."""
+    """What a sensor's errors are as the filter sees them: smaller or larger than stated, each like the last, or so."""
     said = []
     if nis_per_dof < MODEST_SQUARES[0]:
-        said.append("pessimistic: errors are smaller than stated")
+        said.append(SMALLER)
     if nis_per_dof > MODEST_SQUARES[1]:
-        said.append("optimistic: errors are larger than stated")
+        said.append(LARGER)
     if not white:
-        said.append("coloured: errors last")
-    return "; ".join(said) or "consistent"
+        said.append(LASTING)
+    return ", ".join(said) or "as stated"
+
+
+def meanings(verdicts: Iterable[str]) -> list[str]:
+    """What the verdicts at hand mean for use and what to do, a sentence for each that occurs."""
+    found = list(verdicts)
+    return [f"{word}: {meaning}" for word, meaning in MEANING.items() if any(word in said for said in found)]
 
 
 # -- many flights, by their errors -----------------------------------------------------------------------
@@ -183,16 +197,47 @@ def anees(sums: ConsistencySums) -> float:
     return float(np.mean(sums.nees[inside])) / (SCORED * sums.flights) if inside.any() else float("nan")
 
 
-def inside_steps(sums: ConsistencySums) -> tuple[int, int]:
-    """How many steps in flight have their mean over flights inside its 95 % band, and of how many."""
-    mean = sums.nees[steps_in_flight(sums)] / sums.flights
+def inside_steps(sums: ConsistencySums, size: Array | float = 1.0) -> tuple[int, int]:
+    """How many steps in flight have their mean over flights inside its 95 % band, and of how many.
+
+    size: of what is stated of the covariance, by which it is multiplied before: of each step (epochs,), or of all.
+    """
+    inside = steps_in_flight(sums)
+    mean = sums.nees[inside] / (sums.flights * np.broadcast_to(size, inside.shape)[inside])
     low, high = chi_square_band(sums.flights)
     return int(np.count_nonzero((mean >= low) & (mean <= high))), len(mean)
 
 
+class Within(NamedTuple):
+    """Shares of the steps in flight whose groups' ANEES is inside its band: as stated, and had the covariance of a
+    group been stated as large as the other groups' flights show it to be, by one number for the whole case, or by one
+    for each step. NaN where there are no others.
+
+    The second is what a filter can reach whose stated size is right on average, the third one that is right always.
+    """
+
+    as_stated: float
+    sized: float
+    sized_at_each_step: float
+
+
+def within_band(groups: Sequence[ConsistencySums], sums: ConsistencySums) -> Within:
+    """The shares of groups of flights, of which `sums` has all."""
+    as_stated, by_case, by_step = [], [], []
+    for group in groups:
+        as_stated.append(inside_steps(group))
+        others = sums.flights - group.flights
+        if others > 0:
+            ratio = (sums.nees - group.nees) / (SCORED * others)
+            inside = steps_in_flight(group)
+            by_case.append(inside_steps(group, float(np.mean(ratio[inside])) if inside.any() else 1.0))
+            by_step.append(inside_steps(group, np.maximum(ratio, np.finfo(float).tiny)))
+    return Within(*map(inside_fraction, (as_stated, by_case, by_step)))
+
+
 def inside_fraction(groups: Sequence[tuple[int, int]]) -> float:
     """Share of the steps in flight inside the band, over groups as `inside_steps` has them; NaN without a step."""
-    inside, steps = (sum(column) for column in zip(*groups, strict=True))
+    inside, steps = (sum(group[i] for group in groups) for i in (0, 1))
     return inside / steps if steps else float("nan")
 
 

@@ -111,10 +111,9 @@ def followed(c: Course, touch: Touch, epoch: int, s: Moving) -> tuple[Course, To
 
 
 @kernel
-def first_contact(on_ground: Array) -> NDArray[np.int64]:
-    """The epoch of each lane's first ground contact after being airborne, -1 where there is none; (lanes,)."""
+def put_first_contact(on_ground: Array, found: NDArray[np.int64]) -> None:
+    """What `first_contact` gives, into -1 in each lane."""
     epochs, lanes = on_ground.shape
-    found = np.full(lanes, -1)
     for lane in range(lanes):
         untouched = 0.0
         for k in range(epochs):
@@ -123,4 +122,10 @@ def first_contact(on_ground: Array) -> NDArray[np.int64]:
                 found[lane] = k
                 break
             untouched = 0.0 if touches else untouched + 1.0
+
+
+def first_contact(on_ground: Array) -> NDArray[np.int64]:
+    """The epoch of each lane's first ground contact after being airborne, -1 where there is none; (lanes,)."""
+    found = np.full(on_ground.shape[1], -1)
+    put_first_contact(on_ground, found)
     return found

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.compile import equation, kernel, larger, magnitude, sparingly
+from flownav.core.frames import heading_from_quaternion, rotation_from_quaternion
 from flownav.core.measurement import Array
 from flownav.core.parameter_files import shipped
 from flownav.core.text import finite_or_none
@@ -69,13 +70,8 @@ def _sums_of(kept: Array) -> ErrorSums:
 
 
 @kernel
-def error_statistics(estimate: Array, truth: Array, counted: Array) -> Array:
-    """Mean, standard deviation, RMS and largest absolute error over the steps that count.
-
-    estimate and truth (epochs, states, lanes), counted (epochs, lanes) 0/1 -> (lanes, states, 4), in the order of
-    STATISTICS; NaN of a lane in which no step counts. The standard deviation is that of the error about its mean (the
-    paper's "difference in standard deviation").
-    """
+def put_error_statistics(estimate: Array, truth: Array, counted: Array, result: Array) -> None:
+    """What `error_statistics` gives."""
     epochs, states, lanes = estimate.shape
     sums, count = np.zeros((states, lanes, 5)), np.zeros(lanes)
     for k in range(epochs):
@@ -88,12 +84,23 @@ def error_statistics(estimate: Array, truth: Array, counted: Array) -> Array:
                     )
                     for i in range(5):
                         sums[state, lane, i] = now[i]
-    result = np.empty((lanes, states, 4))
     for lane in range(lanes):
         for state in range(states):
             found = statistics_of(_sums_of(sums[state, lane]), count[lane])
             for i in range(4):
                 result[lane, state, i] = found[i]
+
+
+def error_statistics(estimate: Array, truth: Array, counted: Array) -> Array:
+    """Mean, standard deviation, RMS and largest absolute error over the steps that count.
+
+    estimate and truth (epochs, states, lanes), counted (epochs, lanes) 0/1 -> (lanes, states, 4), in the order of
+    STATISTICS; NaN of a lane in which no step counts. The standard deviation is that of the error about its mean (the
+    paper's "difference in standard deviation").
+    """
+    _, states, lanes = estimate.shape
+    result = np.empty((lanes, states, 4))
+    sparingly(put_error_statistics, counted.size, estimate, truth, counted, result)
     return result
 
 
@@ -103,7 +110,7 @@ def score_block(estimate: Array, truth: Array, touchdown: Array, counted: Array)
     estimate and truth (epochs, 6, lanes): position NED [m] and velocity body FRD [m/s]; touchdown (lanes,
     len(TOUCHDOWN_COLUMNS)); counted (epochs, lanes) 0/1: the steps whose errors count.
     """
-    statistics = sparingly(error_statistics, counted.size, estimate, truth, counted)
+    statistics = error_statistics(estimate, truth, counted)
     largest = statistics[:, :3, 3].max(axis=1)
     return np.column_stack([statistics.reshape(len(statistics), -1), largest, touchdown])
 
@@ -134,6 +141,55 @@ def _nested(number: Any) -> dict[str, Any]:
         for i, state in enumerate(STATES)
     }
     return {"states": states, "max_position_error_m": number(MAX_POSITION_ERROR)}
+
+
+# -- attitude ----------------------------------------------------------------------------------------------------
+ANGLES = ("roll", "pitch", "yaw")
+
+
+def attitude_block(said: Array, true: Array, counted: Array) -> Array:
+    """STATISTICS of the errors of roll, pitch and yaw [deg] of a block of flights, (lanes, 3, 4).
+
+    said, true: quaternions body to earth (epochs, 4, lanes); counted (epochs, lanes) 0/1: the steps whose errors count.
+    """
+    apart = euler_deg(*np.moveaxis(said, 1, 0)) - euler_deg(*np.moveaxis(true, 1, 0))
+    within = np.ascontiguousarray(np.moveaxis(apart - 360.0 * np.rint(apart / 360.0), 0, 1))
+    counts = counted * np.isfinite(within).all(axis=1)
+    found = error_statistics(within, np.zeros_like(within), counts)
+    return found
+
+
+def euler_deg(w: Array, x: Array, y: Array, z: Array) -> Array:
+    """Roll, pitch and yaw [deg] of unit quaternions, arrays of any shape: (3, ...), as `frames.euler_from_quaternion`
+    has them of one.
+    """
+    rotation = rotation_from_quaternion(w, x, y, z)  # type: ignore[arg-type]  # of arrays, element by element
+    roll, pitch = np.arctan2(rotation[7], rotation[8]), np.arcsin(np.clip(-np.asarray(rotation[6]), -1.0, 1.0))
+    return np.asarray(np.degrees([roll, pitch, heading_from_quaternion(w, x, y, z)]))
+
+
+def attitude_scores(blocks: Array) -> dict[str, Any] | None:
+    """Errors of attitude [deg] as the JSON of `flownav fly`, blocks (flights, 3, 4): of one flight each number, of many
+    its median and 5th and 95th percentile; None where no attitude was said.
+    """
+    if not np.isfinite(blocks).any():
+        return None
+    one = len(blocks) == 1
+    return {
+        angle: {
+            name: finite_or_none(float(blocks[0, i, j])) if one else spread(blocks[:, i, j])
+            for j, name in enumerate(STATISTICS)
+        }
+        for i, angle in enumerate(ANGLES)
+    }
+
+
+def attitude_rms(blocks: Array | None) -> dict[str, float | None]:
+    """RMS error of roll, pitch and yaw [deg] over all flights, blocks (flights, 3, 4); null where none was said."""
+    if blocks is None or not np.isfinite(blocks).any():
+        return dict.fromkeys(ANGLES)
+    squares = np.nanmean(blocks[:, :, STATISTICS.index("rms_error")] ** 2, axis=0)
+    return {angle: finite_or_none(float(np.sqrt(square))) for angle, square in zip(ANGLES, squares, strict=True)}
 
 
 # -- the paper's Tables 5 and 6 beside ours ----------------------------------------------------------------------

@@ -99,6 +99,16 @@ def touchdown_of_flights(rows: Array) -> dict[str, Any] | None:
     }
 
 
+def touches_of_flights(rows: Array, touchdown: Mapping[str, Any]) -> dict[str, Any]:
+    """Where many flights touched [m] from the pad's centre, those that did, and what `touchdown` says of their radius.
+
+    rows (flights, len(TOUCHDOWN_COLUMNS)).
+    """
+    touched = rows[np.isfinite(rows[:, CONTACT_DISTANCE])]
+    places = {name: touched[:, column_of("contact", name)].tolist() for name in ("north_m", "east_m")}
+    return {"flights": len(rows), "r95_m": touchdown["contact"]["r95_m"], **places}
+
+
 def verdict_of(row: Array) -> str:
     """What became of a flight: landed, crashed, went around (and is aloft at the end), or none of these."""
     if row[BROKEN] > 0.0:

@@ -188,8 +188,9 @@ def autopilot_errors(estimate: Table, truth: Table | None, gps: Mapping[Sensor, 
     return _errors("gps", error, moving_rms, None)
 
 
-def in_frame_of(t_s: Array, position: Array, estimate: Table, gps: Mapping[Sensor, Stream]) -> Table | None:
-    """An autopilot's estimate in the frame of another one, t_s (n,) and position (n, 3); None where they share no time.
+def placed_in(t_s: Array, position: Array, estimate: Table, gps: Mapping[Sensor, Stream]) -> Alignment | None:
+    """What puts an autopilot's estimate into the frame of another one, t_s (n,) and position (n, 3); None where they
+    share no time.
 
     By GPS where there is some: shifted by its mean difference from GPS, the frame of which is the other's. Without,
     the autopilot's north may be any: turned and shifted onto the other.
@@ -201,20 +202,22 @@ def in_frame_of(t_s: Array, position: Array, estimate: Table, gps: Mapping[Senso
         if len(error) < LEAST_ROWS:
             return None
         north, east, down = (-error.mean(axis=0)).tolist()
-        return _moved(estimate, Alignment(0.0, (north, east, down)))
+        return Alignment(0.0, (north, east, down))
     covered = (theirs_t_s >= t_s[0]) & (theirs_t_s <= t_s[-1])
     if np.count_nonzero(covered) < LEAST_ROWS:
         return None
     ours = theirs[covered] + difference_at(t_s, position, theirs_t_s, theirs)
-    return _moved(estimate, align(ours, theirs[covered]))
+    return align(ours, theirs[covered])
 
 
-def _moved(estimate: Table, placed: Alignment) -> Table:
-    """An estimate with its position and attitude in another frame; velocity, in body axes, stays."""
-    table = {**estimate, **dict(zip(POSITION_NED, placed.moved(columns_of(estimate, POSITION_NED)).T, strict=True))}
+def moved_by(estimate: Table, placed: Alignment) -> Table:
+    """An estimate with its position and attitude, where it has them, in another frame; body velocity stays."""
+    table: Table = dict(estimate)
+    if set(POSITION_NED) <= estimate.keys():
+        table |= dict(zip(POSITION_NED, placed.moved(columns_of(estimate, POSITION_NED)).T, strict=True))
     if set(QUATERNION) <= estimate.keys():
         turned = turned_about_down(tuple(columns_of(estimate, QUATERNION).T), placed.yaw_rad)
-        table |= dict(zip(QUATERNION, turned, strict=True))
+        table |= dict(zip(QUATERNION, map(np.asarray, turned), strict=True))
     return table
 
 

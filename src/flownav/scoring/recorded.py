@@ -11,7 +11,14 @@ from flownav.core.errors import InputError
 from flownav.core.measurement import COLUMNS, Array, Sensor
 from flownav.core.record import POSITION_NED, PROTECTION_LEVELS, QUATERNION, VELOCITY_BODY, Column, Record
 from flownav.scoring.consistency import consistency_by_sensor
-from flownav.scoring.errors import MAX_POSITION_ERROR, STATISTICS, score_block, scores_of_flight
+from flownav.scoring.errors import (
+    MAX_POSITION_ERROR,
+    STATISTICS,
+    attitude_block,
+    attitude_scores,
+    score_block,
+    scores_of_flight,
+)
 from flownav.scoring.landings import takeoff_of_flight, takeoffs, with_reason
 from flownav.scoring.path import References, columns_of, end_drift_of, motion_of, path_scores, truth_motion
 from flownav.scoring.phases import Phase, phase_at
@@ -88,7 +95,16 @@ def flight_scores(record: Record, estimate: Estimate) -> dict[str, Any]:
     )  # fmt: skip
     row = score_block(said[:, :, None], true[:, :, None], touched, counted[:, None])[0]
     end_m = float(over_ground.cg_height_m[-1, 0]) - float(facts["cg_above_skid_m"])
-    return with_reason(scores_of_flight(_known(row)), end_m, facts) | {"takeoff": _takeoff(record, facts)}
+    scores = with_reason(scores_of_flight(_known(row)), end_m, facts)
+    return scores | {"takeoff": _takeoff(record, facts), "attitude_deg": attitude_of(record, estimate)}
+
+
+def attitude_of(record: Record, estimate: Estimate) -> dict[str, Any] | None:
+    """Errors of an estimate's attitude against the truth of a simulated flight, as `attitude_scores` has them."""
+    truth, counted = record.tables["truth"], np.asarray(record.tables["judging"]["counted"], float)
+    said = at_instants(estimate, QUATERNION, np.asarray(truth["t_s"], float))
+    true = columns_of(truth, QUATERNION)
+    return attitude_scores(attitude_block(said[:, :, None], true[:, :, None], counted[:, None]))
 
 
 def _known(row: Array) -> Array:

@@ -22,16 +22,19 @@ class Alignment(NamedTuple):
     """What takes the reference into the estimate's frame: first turned by yaw, then shifted.
 
     yaw_shown: whether the two paths move enough, and alike, to show the yaw; it is the best fit all the same.
+    axis: the yaw's cosine and sine where they are known without it, which then are the same on every processor.
     """
 
     yaw_rad: float
     shift_ned_m: tuple[float, float, float]
     yaw_shown: bool = True
+    axis: tuple[float, float] | None = None
 
     def turned(self, vectors_ned: Array) -> Array:
         """Vectors (n, 3) in the estimate's axes."""
         north, east, down = vectors_ned.T
-        return np.column_stack([*turned_level(north, east, np.cos(self.yaw_rad), np.sin(self.yaw_rad)), down])
+        cosine, sine = self.axis or (np.cos(self.yaw_rad), np.sin(self.yaw_rad))
+        return np.column_stack([*turned_level(north, east, cosine, sine), down])
 
     def moved(self, positions_ned_m: Array) -> Array:
         """Positions (n, 3) in the estimate's frame."""
@@ -42,17 +45,20 @@ def align(estimate_ned_m: Array, reference_ned_m: Array) -> Alignment:
     """The yaw and the shift that bring a reference (n, 3) closest to an estimate (n, 3) at the same instants.
 
     Least squares over the horizontal plane (Umeyama 1991 in two dimensions, scale 1): the yaw is the angle of
-    sum(conj(r) e) of the centred positions as complex numbers.
+    sum(conj(r) e) of the centred positions as complex numbers, whose parts are `along` and `across`.
     """
     mean_estimate, mean_reference = estimate_ned_m.mean(axis=0), reference_ned_m.mean(axis=0)
     ours, theirs = estimate_ned_m - mean_estimate, reference_ned_m - mean_reference
-    product = np.sum((theirs[:, 0] - 1j * theirs[:, 1]) * (ours[:, 0] + 1j * ours[:, 1]))
-    turn = Alignment(float(np.angle(product)), (0.0, 0.0, 0.0))
+    along = float(np.sum(theirs[:, 0] * ours[:, 0] + theirs[:, 1] * ours[:, 1]))
+    across = float(np.sum(theirs[:, 0] * ours[:, 1] - theirs[:, 1] * ours[:, 0]))
+    length = float(np.sqrt(along * along + across * across))
+    axis = (along / length, across / length) if length > 0.0 else (1.0, 0.0)
+    turn = Alignment(float(np.arctan2(across, along)), (0.0, 0.0, 0.0), axis=axis)
     shift = mean_estimate - turn.turned(mean_reference[None, :])[0]
     spread = [float(np.sqrt(np.mean(np.sum(path[:, :2] ** 2, axis=1)))) for path in (ours, theirs)]
-    likeness = abs(product) / max(len(ours) * spread[0] * spread[1], 1e-12)
+    likeness = length / max(len(ours) * spread[0] * spread[1], 1e-12)
     shown = min(spread) >= LEAST_SPREAD_M and likeness >= LEAST_LIKENESS
-    return Alignment(turn.yaw_rad, (float(shift[0]), float(shift[1]), float(shift[2])), shown)
+    return turn._replace(shift_ned_m=(float(shift[0]), float(shift[1]), float(shift[2])), yaw_shown=shown)
 
 
 def velocity_of(t_s: Array, position_m: Array) -> Array:

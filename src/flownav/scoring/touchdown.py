@@ -158,10 +158,11 @@ def hypotenuse(a: float, b: float) -> float:
 
 
 @kernel
-def fold(t_s: Array, motion: Motion, flown: Array, seen: Array, away: Array, limits: Limits, after_s: float) -> Array:
-    """The touchdowns of `touchdowns`, (len(TOUCHDOWN_COLUMNS), lanes)."""
+def fold(
+    t_s: Array, motion: Motion, flown: Array, seen: Array, away: Array, limits: Limits, after_s: float, rows: Array
+) -> None:
+    """The touchdowns of `touchdowns` into rows (len(TOUCHDOWN_COLUMNS), lanes)."""
     epochs, lanes = motion.on_ground.shape
-    rows = np.empty((COLUMNS, lanes))
     for lane in range(lanes):
         course, touch = nothing_yet(), no_touch()
         for k in range(epochs):
@@ -177,7 +178,6 @@ def fold(t_s: Array, motion: Motion, flown: Array, seen: Array, away: Array, lim
         found = judged(course, touch, Timing(contact_s, rest_s, t_s[epochs - 1], after_s), limits)
         for i in range(COLUMNS):
             rows[i, lane] = found[i]
-    return rows
 
 
 def touchdowns(
@@ -191,7 +191,9 @@ def touchdowns(
     """
     block = Motion(*map(_plain, motion))
     told = Limits(*map(float, limits))
-    rows = fold(_plain(t_s), block, _plain(flown_error), _plain(pad_seen), _plain(away), told, float(may_land_after_s))
+    rows = np.empty((COLUMNS, block.on_ground.shape[1]))
+    flown, seen, around = _plain(flown_error), _plain(pad_seen), _plain(away)
+    fold(_plain(t_s), block, flown, seen, around, told, float(may_land_after_s), rows)
     return np.ascontiguousarray(rows.T)
 
 

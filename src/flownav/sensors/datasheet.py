@@ -29,7 +29,7 @@ class Dynamics(ParameterModel):
 
     a_1_s2: Number = Field(gt=0.0, le=1e7)  # a/c is the gain: reported over true slow velocity
     b_1_s: Number = Field(gt=0.0, le=1e4)  # b/c is the delay of slow motion
-    c_1_s2: Number = Field(gt=0.0, le=1e7)  # square of the natural frequency
+    c_1_s2: Number = Field(ge=1e-3, le=1e7)  # square of the natural frequency
 
     @property
     def gain(self) -> float:

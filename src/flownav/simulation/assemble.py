@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from flownav.control.design import gains_for
+from flownav.control.design import gains_for, told_before
 from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import path_through, rounded
+from flownav.control.learnt_model import Told
 from flownav.control.margins import margins_of
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
@@ -20,7 +21,7 @@ from flownav.simulation.dispersion import Design, Distribution, raises_wind
 from flownav.simulation.ensemble import Ensemble, flown, recirculation_of
 from flownav.simulation.fitting import Fitted, fitted
 from flownav.simulation.ground import GroundSettings
-from flownav.simulation.plan import ATTITUDE_S, Flight, FlightPlan
+from flownav.simulation.plan import ATTITUDE_S, Flight, FlightPlan, Happens
 from flownav.simulation.plant import LinearTruth
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
@@ -32,6 +33,7 @@ from flownav.vehicle.state import Controls
 from flownav.vehicle.trim import Trim, parked, parked_multirotor
 
 NEVER_S = 1e9
+ONLY_OF = {"tail rotor stuck": "helicopter", "cyclic servos slow": "helicopter", "motor out": "multirotor"}
 GO_AROUND = {"height_m": "go_around_height_m", "most": "go_arounds_most"}
 CORNER_S = 1.5  # a corner is flown at constant acceleration for so long: take-off passes 3 m by 0.06, not by 0.29
 
@@ -97,6 +99,7 @@ def assemble(scenario: Scenario) -> Setup:
         initial_variance=_initial_variance(scenario, paper),
         linear=_linear_truth(paper, hover) if scenario.truth == "linear" and isinstance(hover, Trim) else None,
         limits=touchdown_limits(file),
+        learns=_learns(scenario, vehicle, hover),
     )
     described = kinds.describe_vehicle(own_file)
     parameters: dict[str, Any] = {
@@ -151,7 +154,10 @@ def _require_paper_helicopter(scenario: Scenario, vehicle: kinds.AnyVehicle) -> 
 def _gains(scenario: Scenario, vehicle: kinds.AnyVehicle, hover: kinds.AnyTrim) -> AutopilotGains:
     """The vehicle's gains, what the scenario says of them, and the last metres."""
     section = scenario.autopilot
-    precision = {} if section.precision is None else section.precision.model_dump()
+    own_gate = scenario.filter.name != "paper" or section.go_around is not None  # the paper's landing has no gate
+    precision = section.precision.model_dump() if section.precision is not None and own_gate else {}
+    if precision and _may_learn(scenario, hover) and section.learning is not None:
+        precision["align_radius_m"] = section.learning.align_radius_m or precision["align_radius_m"]
     around = {} if section.go_around is None else section.go_around.model_dump()
     given = {
         "position_gain": section.position_gain_1_s,
@@ -166,6 +172,32 @@ def _gains(scenario: Scenario, vehicle: kinds.AnyVehicle, hover: kinds.AnyTrim) 
         **precision,
         **{GO_AROUND.get(name, name): value for name, value in around.items()},
     )
+
+
+def _may_learn(scenario: Scenario, hover: kinds.AnyTrim) -> bool:
+    """Whether it is a helicopter with its navigator's sensors; others have no rotor on a spring."""
+    return scenario.filter.name == "landing" and isinstance(hover, Trim)
+
+
+def _learns(scenario: Scenario, vehicle: kinds.AnyVehicle, hover: kinds.AnyTrim) -> Told | None:
+    """What is believed of a vehicle that may learn itself."""
+    if not _may_learn(scenario, hover) or not isinstance(hover, Trim) or isinstance(vehicle, MultirotorParameters):
+        return None
+    learning = scenario.autopilot.learning
+    return told_before(vehicle, hover, -1 if learning is None else round(learning.begins_s / EPOCH_S))
+
+
+def _happens(scenario: Scenario, vehicle: kinds.AnyVehicle) -> Happens:
+    """When what befalls the vehicle. InputError where such a vehicle has no such part."""
+    other = "helicopter" if isinstance(vehicle, MultirotorParameters) else "multirotor"
+    for event in scenario.event:
+        if ONLY_OF.get(event.kind, "") == other:
+            raise InputError(f"{scenario.name}: [[event]] {event.kind}: of a {other} only; this vehicle has none")
+
+    def first(kind: str) -> float:
+        return min((event.at_s for event in scenario.event if event.kind == kind), default=NEVER_S)
+
+    return Happens(*(first(kind) for kind in ("engine cut", "tail rotor stuck", "cyclic servos slow", "motor out")))
 
 
 def _plan(
@@ -188,7 +220,7 @@ def _plan(
         home_at_start=scenario.autopilot.home == "start",
         start_known=start_of(scenario) == "known",
         handover_s=section.takeoff_at_s if on_ground else float(scenario.filter.handover_s),
-        engine_cut_s=min((event.at_s for event in scenario.event), default=NEVER_S),
+        happens=_happens(scenario, vehicle),
         draws=Draws(
             paper=scenario.filter.name == "paper",
             gps_drift=scenario.filter.name == "paper" and scenario.gps.model != "white",

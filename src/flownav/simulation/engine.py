@@ -9,6 +9,8 @@ from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
+from flownav.control.learning import Learnt
+from flownav.control.learnt_gains import LoopGains
 from flownav.core.compile import LANES, ONE_LANE, announce_compilation, compile_beside
 from flownav.core.measurement import Array, Sensor
 from flownav.navigation.memory import new_work
@@ -34,12 +36,13 @@ BLOCKS_AHEAD = 4  # blocks that each thread may be ahead of who takes their resu
 
 class Flown(NamedTuple):
     """A block of flights with everything that was written: history (epochs, len(HISTORY), lanes), the navigator's tape,
-    and what it was fed (readings, fields of navigation.memory.Reading, lanes).
+    what it was fed (readings, fields of navigation.memory.Reading, lanes), and what each lane learnt of its vehicle.
     """
 
     history: Array
     tape: Tape
     fed: Array
+    learnt: Sequence[tuple[Learnt, LoopGains]] = ()
 
 
 class Branches(NamedTuple):
@@ -134,7 +137,19 @@ def fly_written(
     buffers = buffers_of(flight, lanes, flight.plan.epochs, written=True)
     with announce_compilation("single-flight" if len(lanes) == 1 else "batch"):
         fly_into(flight, seed, first, lanes, buffers, ensemble, Instead(branches, faults))
-    return Flown(buffers.history, buffers.tape, buffers.fed)
+    return Flown(buffers.history, buffers.tape, buffers.fed, learnt_in(buffers.work, lanes))
+
+
+def learnt_in(work: Array, lanes: tuple[int, ...]) -> list[tuple[Learnt, LoopGains]]:
+    """What each lane of a block that was flown has learnt of its vehicle, and the gains that it ended with."""
+    rows = work.reshape(-1, len(lanes))
+    learnt, gains = (
+        rows[first : first + len(record._fields)]
+        for first, record in ((layout.LEARNT, Learnt), (layout.LOOP_GAINS, LoopGains))
+    )
+    return [
+        (Learnt(*map(float, learnt[:, lane])), LoopGains(*map(float, gains[:, lane]))) for lane in range(len(lanes))
+    ]
 
 
 def fly_one(flight: Flight, seed: int, index: int = 0, ensemble: Ensemble | None = None) -> Array:

@@ -7,6 +7,9 @@ import numpy as np
 from flownav.control.autopilot import AutopilotState, Estimate, inner_loop, landing_logic, outer_loop
 from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import Knowledge, Reference
+from flownav.control.learning import Stir
+from flownav.control.learnt_gains import LoopGains, gains_with
+from flownav.control.learnt_model import Told
 from flownav.core.compile import Lanes, Work, equation, invoke, procedure, replacing
 from flownav.core.frames import GRAVITY_M_S2, Quaternion, quaternion_product, rotation_from_quaternion
 from flownav.core.measurement import Sensor
@@ -34,7 +37,7 @@ from flownav.simulation.plant import LinearTruth, linear_step, observe_vehicle, 
 from flownav.simulation.records import AttitudeError, Estimated, Felt, Home, Landed, Loads, PaperInput
 from flownav.simulation.sensing import EPOCH_S, lens_height, true_imu
 from flownav.vehicle.parameters import VehicleParameters
-from flownav.vehicle.state import Controls, HelicopterState
+from flownav.vehicle.state import Around, Controls, HelicopterState
 
 over_home = replacing(Estimate, "pos_n", "pos_e", "pos_d")
 
@@ -78,7 +81,7 @@ def command(
     may_land = 1.0 if t_s >= flight.plan.may_land_after_s else 0.0
     threshold_n = CONTACT_SHARE * flight.vehicle.mass_kg * flight.vehicle.gravity_m_s2
     mind_skids(work, lanes, may_fly, may_land, threshold_n, onboard)
-    follow_path(work, lanes, may_land, reference, flight.gains)
+    follow_path(work, lanes, may_land, reference, flight.gains, flight.learns)
 
 
 @PLANT.on_lanes
@@ -93,8 +96,8 @@ def mind_skids(
 
 @PLANT.on_lanes
 def follow_path(
-    before: AutopilotState, estimate: Estimate, home: Home, said: Estimated, known: Knowledge, *, may_land: float,
-    reference: Reference, gains: AutopilotGains,
+    before: AutopilotState, estimate: Estimate, home: Home, said: Estimated, known: Knowledge, loops: LoopGains, *,
+    may_land: float, reference: Reference, gains: AutopilotGains, learns: Told | None,
 ) -> AutopilotState:  # fmt: skip
     """The outer loop, at the attitude that the filter, or the INS, says."""
     relative = over_home(
@@ -102,7 +105,8 @@ def follow_path(
         pos_d=estimate.pos_d - home.down_m,
     )  # fmt: skip
     rotation = rotation_from_quaternion(said.qw, said.qx, said.qy, said.qz)
-    return outer_loop(before, reference, relative, known, rotation, gains, may_land, EPOCH_S)
+    told = gains if learns is None else gains_with(gains, loops)
+    return outer_loop(before, reference, relative, known, rotation, told, may_land, EPOCH_S)
 
 
 @PLANT.on_lanes
@@ -121,7 +125,7 @@ def steer(
     if own is not None and own.steer != 0:
         invoke(own.steer, work)
     else:
-        steer_blades(work, lanes, flight.gains, linear, onboard)
+        steer_blades(work, lanes, flight.gains, linear, onboard, flight.learns)
 
 
 class Steered(NamedTuple):
@@ -129,12 +133,14 @@ class Steered(NamedTuple):
 
     autopilot: AutopilotState
     controls: Controls
+    stir: Stir
 
 
 @PLANT.on_lanes
 def steer_blades(
-    state: HelicopterState, before: AutopilotState, errors: GpsInsErrors, error: AttitudeError, *,
-    gains: AutopilotGains, linear: LinearTruth | None, onboard: Onboard | None,
+    state: HelicopterState, before: AutopilotState, errors: GpsInsErrors, error: AttitudeError, loops: LoopGains,
+    stir: Stir, around: Around, controls: Controls, *,
+    gains: AutopilotGains, linear: LinearTruth | None, onboard: Onboard | None, learns: Told | None,
 ) -> Steered:  # fmt: skip
     """The attitude loop: blade angles for the next 4 ms, on the flown attitude and the flybarless unit's gyros."""
     if onboard is None:
@@ -142,10 +148,25 @@ def steer_blades(
     else:
         qw, qx, qy, qz = own_attitude(state, error)
     rotation = rotation_from_quaternion(qw, qx, qy, qz)
-    after, lon, lat, col, ped = inner_loop(before, rotation, state.p, state.q, state.r, gains, ATTITUDE_S)
+    told = gains if learns is None else gains_with(gains, loops)
+    after, lon, lat, col, ped = inner_loop(before, rotation, state.p, state.q, state.r, told, ATTITUDE_S)
     if linear is not None:
         ped = pedal_sideways(after, gains, linear)
-    return Steered(after, Controls(lon, lat, col, ped))
+    if around.tail_stuck > 0.0:
+        ped = controls.ped
+    if learns is not None:
+        lon, lat = lon + stir.lon, lat + stir.lat
+        stir = asked(stir, lon, lat)
+    return Steered(after, Controls(lon, lat, col, ped), stir)
+
+
+@equation
+def asked(stir: Stir, lon: float, lat: float) -> Stir:
+    """What has been asked of the cyclics in this epoch, with one step of the attitude loop more."""
+    return Stir(
+        stir.lon + stir.lon_step, stir.lat + stir.lat_step, stir.lon_step, stir.lat_step,
+        stir.asked_lon + lon / ATTITUDE_STEPS, stir.asked_lat + lat / ATTITUDE_STEPS,
+    )  # fmt: skip
 
 
 @equation
@@ -267,4 +288,6 @@ def feel(before: Felt, reading: Reading, *, part: int, parts: int) -> Felt:
         x,
         y,
         z,
+        (before.mean_roll_rad_s if part > 0 else 0.0) + reading.value_0 / parts,
+        (before.mean_pitch_rad_s if part > 0 else 0.0) + reading.value_1 / parts,
     )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from flownav.control.autopilot import grounded, hovering
 from flownav.control.guidance import Reference, reference_at
+from flownav.control.learnt_gains import as_told
 from flownav.core.compile import Lanes, Work, equation, invoke, kernel, pointer, replacing
 from flownav.estimation import paper_filter
 from flownav.estimation.paper_filter import STATES, PaperModel, start
@@ -31,13 +32,14 @@ from flownav.simulation.epoch import (
     note_inputs,
 )
 from flownav.simulation.history import write_history
-from flownav.simulation.layout import PLANT, store_autopilot
+from flownav.simulation.layout import PLANT, store_autopilot, store_loop_gains
+from flownav.simulation.learning import learn
 from flownav.simulation.onboard import Onboard
 from flownav.simulation.plan import NOTHING, PHYSICS_S, START_STEP, Flight, OwnParts
 from flownav.simulation.plant import observe_vehicle, place
 from flownav.simulation.records import Estimated, Measured, PaperState, PaperVariance, Spread
 from flownav.simulation.sensing import EPOCH_S, draw_epoch, sense, start_sensors
-from flownav.simulation.surroundings import draw_recirculation, start_surroundings, surround
+from flownav.simulation.surroundings import Runs, draw_recirculation, slow_servos, start_surroundings, surround
 from flownav.vehicle.state import HelicopterState
 
 
@@ -61,6 +63,7 @@ def start_block(b: Block, flight: Flight, onboard: Onboard | None) -> None:
         place(work, lanes, lane, flight.plan.start, flight.rotors)
         autopilot = grounded(flight.gains) if flight.plan.starts_on_ground else hovering(flight.gains)
         store_autopilot(work, lanes, lane, autopilot)
+        store_loop_gains(work, lanes, lane, as_told(flight.gains))
     start_surroundings(work, lanes, flight.rotors)
     observe_start(work, lanes, flight, onboard, flight.own)
     start_sensors(work, lanes, flight.sensors)
@@ -83,8 +86,15 @@ def begin_epoch(b: Block, epoch: int, flight: Flight) -> Reference:
     t_s = epoch * EPOCH_S
     key_lanes(b.work, b.lanes, b.noise.streams, epoch)
     draw_epoch(b.work, b.lanes, b.seed, b.first, epoch, flight.plan.draws)
-    engine = 0.0 if t_s >= flight.plan.engine_cut_s else 1.0
-    surround(b.work, b.lanes, b.seed, b.first, epoch, flight.rotors, flight.plan.draws.recirculation, engine)
+    happens, rotors = flight.plan.happens, flight.rotors
+    now = Runs(
+        0.0 if t_s >= happens.engine_cut_s else 1.0,
+        1.0 if rotors is not None and t_s >= happens.motor_out_s else 0.0,
+        1.0 if t_s >= happens.tail_stuck_s else 0.0,
+    )
+    surround(b.work, b.lanes, b.seed, b.first, epoch, rotors, flight.plan.draws.recirculation, now)
+    if rotors is None and epoch == int(happens.servos_slow_s / EPOCH_S + 0.5):
+        slow_servos(b.work, b.lanes)
     return reference_at(flight.path, t_s)
 
 
@@ -147,6 +157,7 @@ def decide_navigated(
     navigating.note_knowledge(work, lanes, nav)
     navigating.hand_to_autopilot(work, lanes, t_s < flight.plan.handover_s, flight.plan.home_at_start, reference, nav)
     estimate_for_autopilot(work, lanes, flight.plan.fly_on_truth)
+    learn(work, lanes, epoch, flight.gains, flight.learns)
     command(work, lanes, t_s, reference, flight, onboard)
     return Progress(taken, following, at.heard), reference
 

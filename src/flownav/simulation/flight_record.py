@@ -10,14 +10,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.control.learning import VERDICTS
 from flownav.core.measurement import COLUMNS, Array, Sensor
 from flownav.core.provenance import command_line, provenance
 from flownav.core.record import FED, POSITION_NED, PROTECTION_LEVELS, QUATERNION, TABLES, VELOCITY_BODY, Record, Table
+from flownav.core.text import finite
 from flownav.navigation.records import Reading
 from flownav.navigation.tables import estimate_table, happenings, innovation_table, states_table
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import Flown
 from flownav.simulation.history import HISTORY
+from flownav.simulation.scenario import EventSection
 from flownav.simulation.sensing import EPOCH_S, RANGE_EPOCHS
 
 GATE_SIGMA_SHOWN = 3.0  # the paper's filter has no gate: its test ratios are shown against 3 sigma and all are fused
@@ -27,7 +30,7 @@ def record_of(setup: Setup, flown: Flown, seed: int, index: int, lane: int = 0) 
     """The record of flight `index`, not yet scored: lane `lane` of a block that was flown with everything written."""
     history = {key: flown.history[:, i, lane] for i, key in enumerate(HISTORY)}
     t_s: Array = np.arange(len(flown.history), dtype=np.float64) * EPOCH_S
-    record = Record(_manifest(setup, seed, index, float(t_s[-1])))
+    record = Record(_manifest(setup, seed, index, float(t_s[-1])) | _learnt(setup, flown, lane))
 
     def table(name: str, source: str, columns: tuple[str, ...], rows: Any = slice(None), **more: Array) -> None:
         record.add(name, {"t_s": t_s[rows], **{c: history[source, c][rows] for c in columns}, **more})
@@ -46,20 +49,36 @@ def record_of(setup: Setup, flown: Flown, seed: int, index: int, lane: int = 0) 
         running = np.isfinite(history["estimate", "nees"])
         then_s = t_s[running] - setup.fitted.schedule.horizon_s
         record.add("consistency", {"t_s": then_s, "nees": history["estimate", "nees"][running]})
-    happened = [*happened, *_engine_cut(t_s, history, setup.flight.plan.engine_cut_s)]
+    happened = [*happened, *(row for event in setup.scenario.event for row in _befallen(t_s, history, event))]
     record.add("events", _events(t_s, history, happened, by_sensor=setup.fitted is None))
     return record
 
 
-def _engine_cut(
-    t_s: Array, history: dict[tuple[str, str], Array], cut_s: float
+def _learnt(setup: Setup, flown: Flown, lane: int) -> dict[str, Any]:
+    """What the flight learnt of its vehicle, and the gains for it; nothing where none was to be learnt.
+
+    The margins that these keep are `control.learnt_margins.margins_of_record`.
+    """
+    told = setup.flight.learns
+    if told is None or told.begins < 0 or not flown.learnt:
+        return {}
+    learnt, gains = flown.learnt[lane]
+    facts: dict[str, Any] = {"verdict": VERDICTS[int(learnt.state)], "tries": int(learnt.tries)}
+    course = ("state", "since", "tries")
+    facts |= finite({name: value for name, value in learnt._asdict().items() if name not in course})
+    facts["gains"] = gains._asdict()
+    return {"learnt": facts}
+
+
+def _befallen(
+    t_s: Array, history: dict[tuple[str, str], Array], event: EventSection
 ) -> list[tuple[float, str, str, str, float]]:
-    """The event of an engine that gives nothing any more, if the flight got so far."""
-    after = np.flatnonzero(t_s >= cut_s)
+    """What befell the vehicle, if the flight got so far."""
+    after = np.flatnonzero(t_s >= event.at_s)
     if not len(after):
         return []
     height_m = -float(history["truth", "pos_d_m"][after[0]])
-    return [(float(t_s[after[0]]), "vehicle", "engine cut", "centre of gravity above the pad [m]", height_m)]
+    return [(float(t_s[after[0]]), "vehicle", event.kind, "centre of gravity above the pad [m]", height_m)]
 
 
 def _manifest(setup: Setup, seed: int, index: int, duration_s: float) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import Field, model_validator
 
-from flownav.core.compile import clamp, equation, larger
+from flownav.core.compile import clamp, equation, larger, smaller
 from flownav.core.parameter_files import Number, ParameterModel
 from flownav.sensors.geometry import Ground
 from flownav.sensors.processes import gauss_markov, gauss_markov_coefficients
@@ -144,6 +144,48 @@ def step_recirculation(
         gauss_markov(state.down, p.decay, p.drive, normals.down),
         gauss_markov(state.roll, p.decay, p.drive, normals.roll),
         gauss_markov(state.pitch, p.decay, p.drive, normals.pitch),
+    )
+
+
+# of descent, as shares of the induced velocity
+RINGS_FROM, RINGS_FULLY, RINGS_STILL, RINGS_TO = 0.45, 0.9, 1.3, 1.8
+BLOWN_AWAY = 0.95  # and across
+RING_INFLOW, RING_UNSTEADY = 0.25, 0.2  # of it: chosen, not measured on a vehicle of this size
+
+
+@equation
+def ringed(descent: float, across: float) -> float:
+    """How much of a vortex ring a rotor is in, 0 to 1; its descent and speed across as shares of induced velocity.
+
+    The region of Johnson, Model for Vortex Ring State Influence on Rotorcraft Flight Dynamics, NASA TP-2005-213477, in
+    straight lines.
+    """
+    enters = clamp((descent - RINGS_FROM) / (RINGS_FULLY - RINGS_FROM), 0.0, 1.0)
+    leaves = clamp((RINGS_TO - descent) / (RINGS_TO - RINGS_STILL), 0.0, 1.0)
+    share = across / BLOWN_AWAY
+    return smaller(enters, leaves) * larger(1.0 - share * share, 0.0)
+
+
+@equation
+def vortex_ring(
+    wind: WindVelocity, state: RecirculationState, sink_m_s: float, across_m_s: float, thrust_n: float,
+    p: RecirculationParameters,
+) -> WindVelocity:  # fmt: skip
+    """The air, and what a rotor that sinks into its own wake pulls down through itself: more than momentum theory has.
+
+    sink_m_s: downwards over the ground; the wind's own vertical speed counts. across_m_s: horizontally through the air.
+    """
+    induced: float = np.sqrt(larger(thrust_n, 0.0) * p.per_mass_flow_m_kg)
+    per = 1.0 / larger(induced, STILL_M_S)
+    down = ringed((sink_m_s - wind.wind_d_m_s) * per, across_m_s * per) * induced
+    aside = RING_UNSTEADY * down * 2.0 / p.diameter_m
+    return WindVelocity(
+        wind.wind_n_m_s,
+        wind.wind_e_m_s,
+        wind.wind_d_m_s + down * (RING_INFLOW + RING_UNSTEADY * state.down),
+        wind.turn_n_rad_s + aside * state.roll,
+        wind.turn_e_rad_s + aside * state.pitch,
+        wind.turn_d_rad_s,
     )
 
 

@@ -1,12 +1,11 @@
 """The distributions that dispersions are mostly made of, by their inverses: SciPy's numbers to the last bit, without
-`scipy.stats`, which takes 46 MB and half a second.
+`scipy.stats`, which takes 46 MB and half a second. What they need of SciPy is loaded at the first draw.
 """
 
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.special import betaincinv, log1p, log_ndtr, logsumexp, ndtr, ndtri, ndtri_exp
 
 from flownav.core.measurement import Array
 
@@ -45,21 +44,35 @@ class Inverse(NamedTuple):
 
 def _truncated(q: Array, a: float, b: float) -> Array:
     """The normal distribution between a < 0 and b > 0: by logarithms, as SciPy has it."""
+    from scipy.special import log1p, log_ndtr, logsumexp, ndtr, ndtri_exp
+
     mass = log1p(-ndtr(a) - ndtr(-b))
     logs = np.log(q) + mass
     return np.asarray(ndtri_exp(logsumexp([np.full_like(logs, log_ndtr(a)), logs], axis=0)))
 
 
+def _normal(q: Array) -> Array:
+    from scipy.special import ndtri
+
+    return np.asarray(ndtri(q))
+
+
+def _beta(q: Array, a: float, b: float) -> Array:
+    from scipy.special import betaincinv
+
+    return np.asarray(betaincinv(a, b, q))
+
+
 FAMILIES: Mapping[str, Family] = {
-    "norm": Family((), lambda: True, lambda: (-np.inf, np.inf), ndtri),
+    "norm": Family((), lambda: True, lambda: (-np.inf, np.inf), _normal),
     "uniform": Family((), lambda: True, lambda: (0.0, 1.0), lambda q: q),
-    "lognorm": Family(("s",), lambda s: s > 0.0, lambda s: (0.0, np.inf), lambda q, s: np.exp(s * ndtri(q))),
+    "lognorm": Family(("s",), lambda s: s > 0.0, lambda s: (0.0, np.inf), lambda q, s: np.exp(s * _normal(q))),
     "loguniform": Family(
         ("a", "b"), lambda a, b: 0.0 < a < b, lambda a, b: (a, b),
         lambda q, a, b: np.exp(np.log(a) + q * (np.log(b) - np.log(a))),
     ),
     "beta": Family(
-        ("a", "b"), lambda a, b: a > 0.0 and b > 0.0, lambda a, b: (0.0, 1.0), lambda q, a, b: betaincinv(a, b, q)
+        ("a", "b"), lambda a, b: a > 0.0 and b > 0.0, lambda a, b: (0.0, 1.0), _beta
     ),
     "truncnorm": Family(("a", "b"), lambda a, b: a < 0.0 < b, lambda a, b: (a, b), _truncated),
 }  # fmt: skip

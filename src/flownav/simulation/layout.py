@@ -6,8 +6,11 @@ that kernels see them as compile-time numbers.
 
 from typing import Any
 
+from flownav.control import learning
 from flownav.control.autopilot import AutopilotState, Estimate
 from flownav.control.guidance import Knowledge
+from flownav.control.learning import Learnt, Stir
+from flownav.control.learnt_gains import LoopGains
 from flownav.core.compile import Layout, lane_access
 from flownav.estimation.paper_filter import STATES, kalman_row_count, kalman_rows
 from flownav.navigation.records import Reading
@@ -119,6 +122,12 @@ NEES = _rows.keep(records.Nees)
 ESTIMATE = _rows.keep(Estimate)  # what it flies on
 HOME = _rows.keep(records.Home)
 AUTOPILOT = _rows.keep(AutopilotState)
+# what it learns of the vehicle
+LOOP_GAINS = _rows.keep(LoopGains)
+_rows.keep(Stir)
+LEARNT = _rows.keep(Learnt)
+SPECTRA = _rows.take(learning.SPECTRA)
+LEARNING_SCRATCH = _rows.take(learning.SCRATCH)
 
 ROWS = _rows.next
 # behind the rows: readings on their way, a ring of slots, each with one reading of every lane. They are filled in the
@@ -159,6 +168,10 @@ load_gps_held, store_gps_held = lane_access(NavSolution, GPS_HELD)
 _, store_gps = PLANT.access(NavSolution)
 load_gps_normals, _ = PLANT.access(GpsInsNormals)
 load_autopilot, store_autopilot = PLANT.access(AutopilotState)
+load_loop_gains, store_loop_gains = PLANT.access(LoopGains)
+load_stir, store_stir = PLANT.access(Stir)
+load_learnt, store_learnt = PLANT.access(Learnt)
+load_felt, _ = PLANT.access(records.Felt)
 vehicle_as_is, _ = lane_access(PARTS["vehicle"], AS_IS["vehicle"])  # of a multirotor its first fields only
 multirotor_as_is, _ = lane_access(MultirotorParameters, AS_IS["vehicle"])
 ground_as_is, _ = lane_access(PARTS["ground"], AS_IS["ground"])

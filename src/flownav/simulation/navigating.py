@@ -14,14 +14,14 @@ from flownav.core.compile import Lanes, Work, equation, invoke, larger, procedur
 from flownav.core.frames import conjugate, quaternion_product, rotation_from_quaternion, to_body, to_earth
 from flownav.estimation.consistency import normalised_error
 from flownav.estimation.named import Attitude, PositionNed, VelocityNed
-from flownav.navigation.ahead import Carried, carried, coasted, state_of
 from flownav.navigation.memory import load_reading, load_start, store_reading
+from flownav.navigation.now import Carried, carried, coasted, state_of
 from flownav.navigation.records import GroundMemory, Reading, StartMemory, SuspicionMemory
 from flownav.simulation import records
 from flownav.simulation.block import Aboard
 from flownav.simulation.layout import FIELDS, PLANT, ROWS, load_inertial_then, load_slot, store_estimated, store_row
 from flownav.simulation.said import GroundSaid, PadSaid, PadVariance, StatedVariance, on_both
-from flownav.vehicle.state import HelicopterState
+from flownav.vehicle.state import Around, HelicopterState
 
 EPOCH_S = 0.02
 TRUTH = len(records.TruthThen._fields)
@@ -221,15 +221,19 @@ def over_pad(c: Carried, place: records.PadPlace) -> records.Estimated:
 
 @on_both
 def note_knowledge(
-    before: Knowledge, pad: PadSaid, variance: PadVariance, ground: GroundMemory, suspicion: SuspicionMemory
-) -> Knowledge:
+    before: Knowledge, around: Around, pad: PadSaid, variance: PadVariance, ground: GroundMemory,
+    suspicion: SuspicionMemory,
+) -> Knowledge:  # fmt: skip
     """What the vehicle knows of its landing, by its navigator and its camera, an epoch later."""
     found = pad.known > 0.0
     north = variance.over_n_m2 if found else variance.own_n_m2
     east = variance.over_e_m2 if found else variance.own_e_m2
     sigma_m = np.sqrt(larger(larger(north, east), 0.0)) if np.isfinite(north + east) else np.inf
     unseen_s = before.pad_unseen_s + EPOCH_S
-    return Knowledge(1.0 if found else 0.0, ground.known, unseen_s, sigma_m, 1.0 if suspicion.suspected > 0.0 else 0.0)
+    powerless_s = before.powerless_s + EPOCH_S if around.engine == 0.0 else 0.0  # as the speed controller tells
+    return Knowledge(
+        1.0 if found else 0.0, ground.known, unseen_s, sigma_m, 1.0 if suspicion.suspected > 0.0 else 0.0, powerless_s
+    )
 
 
 @PLANT.on_lanes

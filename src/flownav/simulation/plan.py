@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import Path
+from flownav.control.learnt_model import Told
 from flownav.estimation.paper_filter import PaperModel
 from flownav.sensors.geometry import Ground
 from flownav.simulation.ground import RecirculationParameters
@@ -22,9 +23,19 @@ ATTITUDE_STEPS = 5  # 250 Hz within an epoch
 PHYSICS_STEPS = 2  # 500 Hz within an attitude step
 ATTITUDE_S = EPOCH_S / ATTITUDE_STEPS
 PHYSICS_S = ATTITUDE_S / PHYSICS_STEPS
+SLOW = 0.4  # of a servo's frequency on a failing supply: chosen
 CONTACT_SHARE = 0.05  # of the weight on the skids counts as touching (a skid switch): chosen, not measured
 START_STEP = 1 << 40  # the noise counter's step for the draws before the first epoch
 NOTHING = np.zeros(0)
+
+
+class Happens(NamedTuple):
+    """When what befalls the vehicle [s since the start]; `NEVER_S`: it does not."""
+
+    engine_cut_s: float  # from then on the engine gives nothing
+    tail_stuck_s: float  # the tail rotor's blades stay as they are
+    servos_slow_s: float  # the cyclic's servos have SLOW of their frequency
+    motor_out_s: float  # a multirotor's first motor gives nothing
 
 
 class FlightPlan(NamedTuple):
@@ -41,7 +52,7 @@ class FlightPlan(NamedTuple):
     home_at_start: bool  # the pad is where the estimate first puts the start, else at the filter's origin
     start_known: bool  # the paper's filter starts at the true position, else at the first GPS reading
     handover_s: float  # until then the vehicle is flown on the truth, where it does not stand on its skids
-    engine_cut_s: float  # from then on the engine gives nothing
+    happens: Happens
     draws: Draws
 
 
@@ -79,4 +90,5 @@ class Flight(NamedTuple):
     linear: LinearTruth | None
     limits: TouchdownLimits
     fails: bool | None = None  # its sensors may fail, each lane's as its truth has it; None: the code is not compiled
+    learns: Told | None = None  # what is believed of a vehicle that may be learnt in hover; None: it is not compiled
     own: OwnParts | None = None  # vehicle and controller that somebody else wrote (room parts/)

@@ -95,7 +95,7 @@ class PaperVariance(Spread):
 
 
 class Felt(NamedTuple):
-    """Specific force that the IMU read, body FRD: the mean over the epoch so far, and the last that it read."""
+    """What the IMU read, body FRD: mean specific force over the epoch so far, the last, and the mean rates p and q."""
 
     mean_x_m_s2: float
     mean_y_m_s2: float
@@ -103,6 +103,8 @@ class Felt(NamedTuple):
     last_x_m_s2: float
     last_y_m_s2: float
     last_z_m_s2: float
+    mean_roll_rad_s: float
+    mean_pitch_rad_s: float
 
 
 class Landed(NamedTuple):

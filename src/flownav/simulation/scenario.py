@@ -11,7 +11,9 @@ from typing import Any, Literal
 from pydantic import Field, ValidationInfo, create_model, field_validator
 
 from flownav.core.errors import InputError
+from flownav.core.guard import an_input
 from flownav.core.parameter_files import Number, ParameterModel, load, shipped
+from flownav.core.text import meant
 from flownav.sensors.settings import FlowSettings, GpsInsSettings, PadFixSettings, RangefinderSettings
 from flownav.simulation.carried import carried_sensors
 from flownav.simulation.dispersion import SHIPPED as SHIPPED_DISPERSION
@@ -127,10 +129,14 @@ class GoAroundSection(ParameterModel):
 
 
 class EventSection(ParameterModel):
-    """Something that happens to the vehicle, whoever flies it. "engine cut": from then on the motor gives nothing."""
+    """Something that befalls the vehicle, whoever flies it, from then on.
+
+    engine cut: the motor gives nothing (all of a multirotor's). motor out: a multirotor's first motor gives nothing.
+    tail rotor stuck: its blades stay as they are. cyclic servos slow: they have 0.4 of their frequency.
+    """
 
     at_s: Number = Field(ge=0.0, le=3600.0)  # since the flight's start
-    kind: Literal["engine cut"]  # engine cut: from then on the motor gives nothing
+    kind: Literal["engine cut", "motor out", "tail rotor stuck", "cyclic servos slow"]  # what befalls it: see above
 
 
 _by_channel = sorted(carried_sensors(), key=lambda sensor: sensor.channels.reading)
@@ -151,6 +157,16 @@ class SensorsSection(_SheetFiles):
     texture: Literal["everywhere", "pad"] = "everywhere"
 
 
+class LearningSection(ParameterModel):
+    """The vehicle learnt in flight: 13 s in which both cyclics are stirred, and gains for what they show.
+
+    Helicopters on the navigator only; others fly on as they are.
+    """
+
+    begins_s: Number = Field(ge=0.0, le=3600.0)  # since the flight's start; in hover or on a straight leg
+    align_radius_m: Number | None = Field(None, gt=0.0, le=100.0)  # the gate's of one that learns; none: as of others
+
+
 class AutopilotSection(ParameterModel):
     """What the autopilot flies on, where it takes the pad to be, its gains where the vehicle's do not serve, and the
     collective on the skids.
@@ -166,6 +182,7 @@ class AutopilotSection(ParameterModel):
     velocity_integral_1_s2: Number | None = Field(None, ge=0.0, le=10.0)  # per position error; none: the vehicle's
     precision: PrecisionSection | None = None
     go_around: GoAroundSection | None = None
+    learning: LearningSection | None = None
 
     @field_validator("go_around")
     @classmethod
@@ -214,8 +231,10 @@ def load_scenario(name: str) -> Scenario:
     if name in SHIPPED:
         return load(shipped(f"{name}.toml"), Scenario)
     path = Path(name)
-    if not path.suffix and not path.exists():
-        raise InputError(f"{name}: no such scenario; shipped: {', '.join(SHIPPED)}, or give a TOML file")
+    if not path.suffix and not an_input(path).exists():
+        raise InputError(
+            f"{name}: no such scenario; shipped: {', '.join(SHIPPED)}, or give a TOML file{meant(name, SHIPPED)}"
+        )
     scenario = load(path, Scenario)
     return scenario.model_copy(
         update={

@@ -15,17 +15,36 @@ from flownav.simulation.ground import (
     recirculated,
     step_recirculation,
     under_rotor,
+    vortex_ring,
 )
+from flownav.simulation.plan import SLOW
 from flownav.simulation.records import Loads
 from flownav.simulation.wind import WindNormals, WindParameters, WindState, WindVelocity, start_wind, step_wind
 from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters
 from flownav.vehicle.state import CALM, Around, HelicopterState
 
 Four = tuple[float, float, float, float]
+CYCLIC = layout.AS_IS["vehicle"] + VehicleParameters._fields.index("cyclic_frequency_rad_s")
 
 
-_in_air = replacing(Around, *WindVelocity._fields, "engine")
+_in_air = replacing(Around, *WindVelocity._fields)
+_running = replacing(Around, "engine", "motor_out", "tail_stuck")
 _over_ground = replacing(Around, *Around._fields[6:19])
+
+
+class Runs(NamedTuple):
+    """What of the vehicle runs, as `Around` has it."""
+
+    engine: float
+    motor_out: float
+    tail_stuck: float
+
+
+@procedure
+def slow_servos(work: Work, lanes: Lanes) -> None:
+    """From now on the cyclic's servos have SLOW of their frequency."""
+    for lane in range(len(lanes)):
+        work[CYCLIC * len(lanes) + lane] *= SLOW
 
 
 @procedure
@@ -49,12 +68,12 @@ def first_gusts(normals: WindNormals, wind: WindParameters) -> WindState:
 @procedure
 def surround(
     work: Work, lanes: Lanes, seed: int, first: int, step: int, rotors: tuple[int, ...] | None, recirculates: bool,
-    engine: float,
+    now: Runs,
 ) -> None:  # fmt: skip
-    """The surroundings of this step of the noise counter; engine: 1 runs, 0 is cut."""
+    """The surroundings of this step of the noise counter, and what of the vehicle runs."""
     draw_recirculation(work, lanes, seed, first, step, recirculates)
     lay_ground(work, lanes, rotors)
-    blow(work, lanes, engine)
+    blow(work, lanes, now)
     for lane in range(len(lanes)):
         normals, wake = (
             layout.load_recirculation_normals(work, lanes, lane),
@@ -75,12 +94,13 @@ class Air(NamedTuple):
 @layout.PLANT.on_lanes
 def blow(
     state: HelicopterState, ground: Ground, gusts: WindState, normals: WindNormals, wind: WindParameters, here: Around,
-    *, engine: float,
+    *, now: Runs,
 ) -> Air:  # fmt: skip
-    """The wind at the vehicle's height."""
+    """The wind at the vehicle's height, and what of the vehicle runs."""
     height = -state.pos_d - ground_height(state.pos_n, state.pos_e, ground)
     after, air = step_wind(gusts, height, normals, wind)
-    return Air(after, in_air(here, air, engine))
+    around = _running(here, engine=now.engine, motor_out=now.motor_out, tail_stuck=now.tail_stuck)
+    return Air(after, in_air(around, air))
 
 
 @layout.PLANT.on_lanes
@@ -88,21 +108,33 @@ def come_back(
     state: HelicopterState, wake: RecirculationState, p: RecirculationParameters, here: Around, loads: Loads
 ) -> Around:
     """The air with what comes back of the vehicle's own wake."""
-    cosine = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)[8]
+    rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
+    cosine = rotation[8]
     plane = here.slope_n * state.pos_n + here.slope_e * state.pos_e
     hub = p.hub_above_cg_m * cosine - state.pos_d - plane - here.rotor_1_m
     air = WindVelocity(
         here.wind_n_m_s, here.wind_e_m_s, here.wind_d_m_s, here.turn_n_rad_s, here.turn_e_rad_s, here.turn_d_rad_s
     )
-    return in_air(here, recirculated(air, wake, hub, loads.thrust_n, p), here.engine)
+    returned = recirculated(air, wake, hub, loads.thrust_n, p)
+    _, _, sink = to_earth(rotation, state.u, state.v, state.w)
+    return in_air(here, vortex_ring(returned, wake, sink, _across(state, rotation, air), loads.thrust_n, p))
 
 
 @equation
-def in_air(here: Around, air: WindVelocity, engine: float) -> Around:
-    """The surroundings with this air, and this engine."""
+def _across(state: HelicopterState, rotation: Rotation, air: WindVelocity) -> float:
+    """Horizontal speed through the air [m/s]."""
+    north, east, _ = to_earth(rotation, state.u, state.v, state.w)
+    north, east = north - air.wind_n_m_s, east - air.wind_e_m_s
+    speed: float = np.sqrt(north * north + east * east)
+    return speed
+
+
+@equation
+def in_air(here: Around, air: WindVelocity) -> Around:
+    """The surroundings with this air."""
     return _in_air(
         here, wind_n_m_s=air.wind_n_m_s, wind_e_m_s=air.wind_e_m_s, wind_d_m_s=air.wind_d_m_s,
-        turn_n_rad_s=air.turn_n_rad_s, turn_e_rad_s=air.turn_e_rad_s, turn_d_rad_s=air.turn_d_rad_s, engine=engine,
+        turn_n_rad_s=air.turn_n_rad_s, turn_e_rad_s=air.turn_e_rad_s, turn_d_rad_s=air.turn_d_rad_s,
     )  # fmt: skip
 
 

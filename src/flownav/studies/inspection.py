@@ -17,6 +17,7 @@ from flownav.replays.judged import autopilot_scores, flying_at, obstacles
 from flownav.replays.prepare import ReplayOptions, prepare
 from flownav.replays.sentinel import Finding, findings
 from flownav.scoring.coverage import silences
+from flownav.studies.explain.judge import explain
 
 CLOCK_REASONS = {
     "no_time": "without a time",
@@ -36,6 +37,7 @@ def summarise(log: Log) -> dict[str, Any]:
     checked, found = _findings(log)
     found += told_of(log, look, found)
     found += [Finding(text) for text in silences(log.streams, log.span_s)]
+    explained = explain(log)
     return {
         "log": log.path.name,
         "start_s": start,
@@ -44,6 +46,8 @@ def summarise(log: Log) -> dict[str, Any]:
         "clock": [line for stream in log.streams.values() for line in _clock_trouble(stream)],
         "limits": {name: _limit(log, name) for name in log.limits},
         "verdict": why_not if look is None else look.verdict,
+        "explained": explained.verdict,
+        "causes": [one.name for one in explained.findings],
         "agreement": None if look is None else look._asdict(),
         "checked": checked,
         "warnings": [finding.text for finding in found],

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from flownav.core.errors import InputError
-from flownav.core.parameter_files import read_toml
+from flownav.core.parameter_files import as_shown, read_toml
 from flownav.vehicle.kinds import AnyVehicle, flattened, read_kind, vehicle_file
 from flownav.vehicle.schema import MultirotorFile
 
@@ -117,8 +117,8 @@ def _ends(entry: Any, key: str, path: Path) -> tuple[float, float] | None:
             low, _, high = said.partition("..")
             return float(low), float(high)
         return float(entry["value"] - said), float(entry["value"] + said)
-    except (TypeError, ValueError):
-        raise InputError(f'{path}: {key}: uncertainty is a number or "from..to", got {said!r}') from None
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f'{path}: {key}: uncertainty is a number or "from..to", got {as_shown(said)}') from None
 
 
 def _moved(contents: dict[str, Any], key: str, sign: int, path: Path) -> dict[str, Any]:

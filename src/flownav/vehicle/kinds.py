@@ -4,11 +4,13 @@ A file is checked, made flat, and refused where no such vehicle could hover.
 """
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from flownav.core.errors import InputError
-from flownav.core.parameter_files import check, read_toml, shipped
+from flownav.core.parameter_files import as_shown, check, read_toml, shipped
+from flownav.core.text import meant
 from flownav.vehicle.feasibility import hover_induced_velocity, require_feasible, require_multirotor
 from flownav.vehicle.parameters import (
     MultirotorParameters,
@@ -53,7 +55,7 @@ def schema_of(contents: dict[str, Any], where: str) -> type[VehicleFile] | type[
     if kind is None:
         return VehicleFile
     if kind != KIND:
-        raise InputError(f'{where}: kind = {kind!r}: known is "{KIND}"; a helicopter\'s file says none')
+        raise InputError(f'{where}: kind = {as_shown(kind)}: known is "{KIND}"; a helicopter\'s file says none')
     return MultirotorFile
 
 
@@ -128,9 +130,17 @@ class VehicleDescription(NamedTuple):
 
 
 def vehicle_file(path: Path | None = None) -> Path:
-    """Where a vehicle's file is: a path, a shipped vehicle's name (`quad-450`), the Maxi Joker 3 where it is None."""
+    """Where a vehicle's file is: a path, a shipped vehicle's name (`quad-450`), the Maxi Joker 3 where it is None.
+
+    InputError for a bare name that is neither shipped nor a file.
+    """
     name = "maxi-joker-3" if path is None else str(path)
-    return shipped(SHIPPED_NAMES[name]) if name in SHIPPED_NAMES else Path(name)
+    if name in SHIPPED_NAMES:
+        return shipped(SHIPPED_NAMES[name])
+    if not Path(name).suffix and not Path(name).exists():
+        known = ", ".join(SHIPPED_NAMES)
+        raise InputError(f"{name}: no such vehicle; shipped: {known}, or give a TOML file{meant(name, SHIPPED_NAMES)}")
+    return Path(name)
 
 
 def load_vehicle(path: Path | None = None) -> AnyVehicle:
@@ -155,6 +165,15 @@ def read_kind(contents: dict[str, Any], where: str) -> AnyFile:
     schema: Any = schema_of(contents, where)
     file: AnyFile = check(contents, schema, where)
     return file
+
+
+def described_again(entries: Mapping[str, Any], where: str) -> AnyFile:
+    """The file of a vehicle whose entries (`describe_vehicle`) a record kept. InputError where they are none."""
+    contents: dict[str, Any] = {"schema_version": 1, "name": "as recorded"}
+    for key, entry in entries.items():
+        table, _, name = key.partition(".")
+        contents.setdefault(table, {})[name] = entry["value"]
+    return read_kind(contents, where)
 
 
 def describe_vehicle(path: Path | None = None) -> VehicleDescription:

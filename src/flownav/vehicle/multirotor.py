@@ -146,6 +146,19 @@ def total_power(speeds: Six, vehicle: MultirotorParameters) -> float:
 
 
 @equation
+def driven(voltage_v: float, motor_out: float) -> Six:
+    """The voltage at each motor, none at the one that is out (its number; 0: all run)."""
+    return Six(
+        0.0 if motor_out == 1.0 else voltage_v,
+        0.0 if motor_out == 2.0 else voltage_v,
+        0.0 if motor_out == 3.0 else voltage_v,
+        0.0 if motor_out == 4.0 else voltage_v,
+        0.0 if motor_out == 5.0 else voltage_v,
+        0.0 if motor_out == 6.0 else voltage_v,
+    )
+
+
+@equation
 def derivative_at_roots(
     state: MultirotorState, roots: Six, around: Around, hexa: bool, vehicle: MultirotorParameters
 ) -> MultirotorState:
@@ -160,14 +173,14 @@ def derivative_at_roots(
     speeds = speeds_of(state)
     power = total_power(speeds, vehicle)
     voltage = motors.battery_voltage(power, state.used, vehicle)
-    driving = voltage * around.engine
+    drive = driven(voltage * around.engine, around.motor_out)
     spins = Six(
-        motors.speed_rate(speeds.one, motors.told_speed(roots.one, driving, vehicle), vehicle),
-        motors.speed_rate(speeds.two, motors.told_speed(roots.two, driving, vehicle), vehicle),
-        motors.speed_rate(speeds.three, motors.told_speed(roots.three, driving, vehicle), vehicle),
-        motors.speed_rate(speeds.four, motors.told_speed(roots.four, driving, vehicle), vehicle),
-        motors.speed_rate(speeds.five, motors.told_speed(roots.five, driving, vehicle), vehicle) if hexa else 0.0,
-        motors.speed_rate(speeds.six, motors.told_speed(roots.six, driving, vehicle), vehicle) if hexa else 0.0,
+        motors.speed_rate(speeds.one, motors.told_speed(roots.one, drive.one, vehicle), vehicle),
+        motors.speed_rate(speeds.two, motors.told_speed(roots.two, drive.two, vehicle), vehicle),
+        motors.speed_rate(speeds.three, motors.told_speed(roots.three, drive.three, vehicle), vehicle),
+        motors.speed_rate(speeds.four, motors.told_speed(roots.four, drive.four, vehicle), vehicle),
+        motors.speed_rate(speeds.five, motors.told_speed(roots.five, drive.five, vehicle), vehicle) if hexa else 0.0,
+        motors.speed_rate(speeds.six, motors.told_speed(roots.six, drive.six, vehicle), vehicle) if hexa else 0.0,
     )
     normal = plane_normal(rotation, around)
     below = below_plane(state.pos_n, state.pos_e, state.pos_d, around)

@@ -185,7 +185,8 @@ class Around(NamedTuple):
     wind: of the air over the ground, NED [m/s], where it goes. turn: gradients of the gusts as the air's own rotation,
     NED [rad/s] (MIL-F-8785C's p_g, q_g, r_g). slope: of the ground, rise over run northwards and eastwards; cosine: of
     the plane's inclination. foot: ground over that plane under the feet [m], front right, front left, rear right, rear
-    left; rotor: under the rotors, as ground effect finds it (a helicopter has the first). engine: 1 runs, 0 is cut.
+    left; rotor: under the rotors, as ground effect finds it (a helicopter has the first). engine: 1 runs, 0 is cut or
+    off. motor_out: that of a multirotor's which gives nothing, 1 to 6; 0: none. tail_stuck: 1, the tail's blades stay.
     """
 
     wind_n_m_s: float
@@ -208,6 +209,8 @@ class Around(NamedTuple):
     rotor_5_m: float
     rotor_6_m: float
     engine: float
+    motor_out: float
+    tail_stuck: float
 
 
 CALM = Around(**(dict.fromkeys(Around._fields, 0.0) | {"cosine": 1.0, "engine": 1.0}))  # still air over level ground

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from itertools import pairwise, product
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,7 @@ class SensorFailure:
     @property
     def words(self) -> str:
         """What, from when to when, and what that does."""
-        return f"{self.name} from {self.begins_s:g} to {self.ends_s:g} s: {FAULTS[self.name].what}"
+        return f"{self.name} from {self.begins_s:.15g} to {self.ends_s:.15g} s: {FAULTS[self.name].what}"
 
     def law(self, flight: Flight, seed: int, number: int) -> SensorFault:
         """One flight's fault."""
@@ -105,9 +106,10 @@ def cells_of(requirement: Requirement, vehicle: str | None = None) -> tuple[Cell
         "fault": conditions.fault,
     }
     named = {name: values for name, values in lists.items() if values}
+    count = prod(map(len, named.values()))
+    if count > MOST_CELLS:
+        raise InputError(f"{requirement.name}: conditions: {count} cells; at most {MOST_CELLS} are flown")
     combinations = [dict(zip(named, values, strict=True)) for values in product(*named.values())]
-    if len(combinations) > MOST_CELLS:
-        raise InputError(f"{requirement.name}: conditions: {len(combinations)} cells; at most {MOST_CELLS} are flown")
     return tuple(_cell(requirement, values, vehicle) for values in combinations)
 
 
@@ -145,7 +147,7 @@ def words_of(cell: Cell) -> str:
 
 def _words(name: str, value: Any) -> str:
     if name == "height_m":
-        return f"from {value:g} m"
+        return f"from {value:.15g} m"
     return "no fault" if value == NO_FAULT and name == "fault" else str(value)
 
 

@@ -8,22 +8,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.campaigns.certification.again import SAMPLE, Again, deciding, drawn, fly_again
 from flownav.campaigns.certification.cells import words_of
 from flownav.campaigns.certification.envelope import Judgement, bad_first, envelope_of, failing, judged, outcome
+from flownav.campaigns.chain import DIGEST_BYTES, DamagedError, read_part, write_part
 from flownav.campaigns.engines import Engine, Part
 from flownav.campaigns.measures import ROW_COLUMNS, measured
 from flownav.campaigns.plan import Plan
 from flownav.campaigns.ranking import Index, Ranking, rank
-from flownav.campaigns.requirement import Requirement, RequirementTable, fixed_by
+from flownav.campaigns.requirement import USUAL_SEED, Requirement, RequirementTable, fixed_by, scenario_of
 from flownav.campaigns.run import Watch, run_campaign
-from flownav.campaigns.store import Dataset, Store, column, numbers, read
+from flownav.campaigns.store import Dataset, Store
 from flownav.campaigns.summary import inputs_of
 from flownav.campaigns.tolerance import Verdict, joint
+from flownav.core.arrow_columns import as_numpy, numbers
 from flownav.core.files import written_whole
 from flownav.core.measurement import Array
 from flownav.core.text import finite
 from flownav.simulation.dispersion import Design
 
+NONE_AGAIN = Again(0, 0)
 FLIGHTS_TOLD = 10  # flights that are named as the worst
 
 
@@ -54,6 +58,7 @@ class Certificate:
     envelope: dict[str, Any]
     worst: tuple[int, ...]
     ranking: dict[str, Any] | None
+    again: Again = NONE_AGAIN
 
     @property
     def verdict(self) -> Verdict:
@@ -76,8 +81,10 @@ class Certificate:
                 "set": fixed_by(own),
             },
             "seed": own.seed,
+            "chosen": self.chosen(),
             "flights": len(rows),
             "needed": own.flights(),
+            "flown_again": self.again._asdict(),
             "failures": together["failures"],
             "low": together["low"],
             "high": together["high"],
@@ -88,6 +95,25 @@ class Certificate:
             "worst": [self.told(flight) for flight in self.worst],
         }
         return facts | ({"ranking": None, "split": None} if self.ranking is None else self.ranking)
+
+    def chosen(self) -> dict[str, int | str | None]:
+        """What was left to whoever asked, and was not left as it is: the seed, how many flights in all, the vehicle.
+
+        Who may choose these may try them until the flights pass.
+        """
+        own, cells = self.requirement, len(self.plan.cells)
+        usual = cells * -(-own.flights() // cells)
+        flights = cells * self.plan.flights
+        return {
+            "seed": None if own.seed == USUAL_SEED else own.seed,
+            "flights": None if flights == usual else flights,
+            "vehicle": self._other_vehicle(),
+        }
+
+    def _other_vehicle(self) -> str | None:
+        """The vehicle that was flown in place of the requirement's, where that names but one."""
+        own, flown = self.requirement, self.plan.cells[0].scenario.vehicle.file
+        return None if own.conditions.vehicle or flown == scenario_of(own).vehicle.file else flown
 
     def told(self, flight: int) -> dict[str, Any]:
         """One flight in the list of the worst."""
@@ -112,7 +138,11 @@ def certify(
 
     store: open. InputError where a cell cannot be flown.
     """
-    data = run_campaign(plan, engine, store, watch)
+    return judged_from(requirement, plan, run_campaign(plan, engine, store, watch))
+
+
+def judged_from(requirement: Requirement, plan: Plan, data: Dataset) -> Certificate:
+    """What the flights of a folder show; all of the plan are there."""
     flown = flown_of(plan, data)
     judgements = tuple(judged(table, flown.rows) for table in requirement.requirement)
     ready = plan.ready(0)
@@ -125,8 +155,25 @@ def certify(
     return Certificate(requirement, plan, flown, judgements, envelope, worst_of(requirement, flown.rows), None)
 
 
+def checked(
+    certificate: Certificate, data: Dataset, engine: Engine, sample: int = SAMPLE,
+    on_progress: Callable[[int], object] = lambda flown: None,
+) -> Certificate:  # fmt: skip
+    """The certificate once so many of its flights, drawn at random, and those that decided were flown again.
+
+    InputError where one is another than the folder has.
+    """
+    flown, plan = certificate.flown, certificate.plan
+    margin = deciding(certificate.requirement, certificate.judgements, flown.rows)
+    own = drawn(len(flown.rows), sample)
+    places = np.union1d(own, margin)
+    for cell in range(len(plan.cells)):
+        fly_again(plan, data, cell, flown.number[places[flown.cell[places] == cell]].tolist(), engine, on_progress)
+    return replace(certificate, again=Again(len(own), len(margin)))
+
+
 def with_ranking(
-    certificate: Certificate, engine: Engine, store: Store, rows: int,
+    certificate: Certificate, engine: Engine, folder: Path, rows: int,
     on_progress: Callable[[int], object] = lambda flown: None,
 ) -> Certificate:  # fmt: skip
     """The certificate with the inputs ranked, by the first requirement's measure in the cell with most failures.
@@ -135,7 +182,7 @@ def with_ranking(
     """
     plan, table = certificate.plan, certificate.requirement.requirement[0]
     worst = int(np.argmax([cell["failures"] for cell in certificate.envelope["cells"]]))
-    found = ranking_json(ranked(plan, worst, table, rows, engine, store.folder, on_progress))
+    found = ranking_json(ranked(plan, worst, table, rows, engine, folder, on_progress))
     of = {"ranking_measure": table.measure, "ranking_cell": words_of(plan.cells[worst])}
     return replace(certificate, ranking=found | of)
 
@@ -223,18 +270,15 @@ def _index(index: Index, name: str) -> dict[str, Any]:
 
 def _kept(path: Path, flights: int) -> Array | None:
     """The outcomes of a sample that was flown before; None where there is none, or not all of it."""
-    import pyarrow as pa
-
     try:
-        figures = column(read(path), FIGURE)
-    except (OSError, KeyError, pa.ArrowException):
+        figures = as_numpy(read_part(path).table.column(FIGURE))
+    except (OSError, KeyError, DamagedError):
         return None
     return np.asarray(figures) if len(figures) == flights else None
 
 
 def _keep(path: Path, figures: Array) -> None:
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     with written_whole(path) as temporary:
-        pq.write_table(pa.table({FIGURE: numbers(figures)}), temporary)
+        write_part(temporary, pa.table({FIGURE: numbers(figures)}), bytes(DIGEST_BYTES))

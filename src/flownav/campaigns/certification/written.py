@@ -1,7 +1,7 @@
 """A certificate written down: records of the worst flights, what was assumed, hashes of every file, JSON and page."""
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -179,13 +179,13 @@ def words_of(entry: Distribution) -> str:
     """A distribution as its file has it: name, parameters, what is done with the draw."""
     numbers = entry.shapes | {"loc": entry.loc, "scale": entry.scale}
     plain = {"loc": 0.0, "scale": 1.0}
-    said = ", ".join(f"{name} {value:g}" for name, value in numbers.items() if plain.get(name) != value)
+    said = ", ".join(f"{name} {value:.15g}" for name, value in numbers.items() if plain.get(name) != value)
     if entry.mode == "uncertainty" and entry.distribution == "truncnorm":
         low, high = (entry.shapes[name] * entry.scale for name in ("a", "b"))
         if (low, high) == (-1.0, 1.0) and entry.loc == 0.0:
             return f"normal, cut off at the stated uncertainty, {entry.shapes['b']:g} sigma"
     if entry.distribution == "uniform":
-        said = f"{entry.loc:g} to {entry.loc + entry.scale:g}"
+        said = f"{entry.loc:.15g} to {entry.loc + entry.scale:.15g}"
     of = {"value": "", "factor": " times what is believed", "offset": " more than is believed",
           "uncertainty": " of the stated uncertainty"}  # fmt: skip
     return f"{entry.distribution} {said}{of[entry.mode]}"
@@ -222,6 +222,21 @@ def _files_of(scenario: Scenario) -> Iterable[Path]:
                 continue
             if own or sensor.sheet.shipped_file:
                 yield Path(own) if own else shipped(f"sensors/{sensor.sheet.shipped_file}")
+
+
+def hashes_again(said: Mapping[str, str], folder: Path | None) -> str | None:
+    """What is wrong with files that are to have these SHA-256; None where nothing is. folder: in which they lie."""
+    for name, digest in said.items():
+        path = Path(name) if folder is None else folder / name
+        if folder is not None and (Path(name).is_absolute() or ".." in Path(name).parts):
+            return f"{name}: lies elsewhere"
+        try:
+            found = hash_of(path)
+        except OSError as error:
+            return f"{name}: cannot be read ({error.strerror})"
+        if found != digest:
+            return f"{name}: has another SHA-256 than the certificate says"
+    return None
 
 
 def hashes(files: Sequence[Path], beside: Path | None = None) -> dict[str, str]:

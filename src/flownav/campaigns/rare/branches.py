@@ -16,6 +16,7 @@ from flownav.campaigns.rare.walk import Streams
 from flownav.core.compile import LANES
 from flownav.core.errors import InputError
 from flownav.core.files import written_whole
+from flownav.core.guard import object_in
 from flownav.core.measurement import Array
 from flownav.core.record import Record
 from flownav.simulation import layout
@@ -108,6 +109,7 @@ class Space:
 # -- as a file ---------------------------------------------------------------------------------------------------
 SCHEMA_VERSION = 1
 MOST_SPANS = 1_000_000
+OTHER_FILE = "give the rare_flight.json of `flownav campaign --rare`"
 
 
 def branch_text(setup: Setup, branch: Branch, event: str, response: float | None) -> str:
@@ -131,8 +133,8 @@ def write_branch(path: Path, setup: Setup, branch: Branch, event: str, response:
 
 def read_branch(path: Path, setup: Setup) -> Branch:
     """A flight from its file. InputError where it is none, or none of this scenario."""
+    found = object_in(path, OTHER_FILE)
     try:
-        found: Any = json.loads(path.read_text(encoding="utf-8"))
         if found["schema_version"] != SCHEMA_VERSION:
             raise InputError(f"{path}: schema_version {found['schema_version']}: must be {SCHEMA_VERSION}")
         if found["scenario"] != setup.scenario.name:
@@ -141,17 +143,14 @@ def read_branch(path: Path, setup: Setup) -> Branch:
             raise InputError(
                 f"{path}: was flown with other settings; give the options with which `flownav campaign --rare` was run"
             )
-        if sum(int(spans) for _, spans in found["streams"]) > MOST_SPANS:
+        lengths = [int(spans) for _, spans in found["streams"]]
+        if min(lengths, default=0) < 0 or sum(lengths) > MOST_SPANS:
             raise ValueError("too long")
         streams = [int(stream) for stream, spans in found["streams"] for _ in range(int(spans))]
         drawn, start = _numbers(found["drawn"]), _numbers(found["start"])
         branch = Branch(int(found["seed"]), drawn, start, streams)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(
-            f"{path}: no flight of a rare event; give the rare_flight.json of `flownav campaign --rare`"
-        ) from error
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
+        raise InputError(f"{path}: no flight of a rare event; {OTHER_FILE}") from error
     space = Space(setup, branch.seed, dispersed=bool(drawn))
     if set(drawn) != set(space.dispersed) or set(start) != {one.name for one in space.starts}:
         raise InputError(f"{path}: a flight of another scenario: other numbers are drawn for it")

@@ -16,8 +16,7 @@ from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hint
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.compiling.engine import equation
-from flownav.core.compiling.spelled import load_spelled, replaced_spelled, store_spelled
+from flownav.core.compiling.engine import equation, spelled
 
 
 def write_function(name: str, source: str, scope: dict[str, Any]) -> Callable[..., Any]:
@@ -44,7 +43,7 @@ def lane_access(bundle: type, row: int | Sequence[int] | None) -> tuple[Callable
     scope: dict[str, Any] = {"bundle": bundle}
     load = write_function("load", f"def load({told}):\n    return bundle({', '.join(at)})\n", scope)
     store = write_function("store", f"def store({told}, value):\n{stores}\n", scope)
-    return load_spelled(load, bundle, rows), store_spelled(store, bundle, rows)
+    return spelled(load, "load_spelled", bundle, rows), spelled(store, "store_spelled", bundle, rows)
 
 
 Bundle = TypeVar("Bundle", bound=tuple[Any, ...])
@@ -58,7 +57,7 @@ def replacing(bundle: type[Bundle], *names: str) -> Callable[..., Bundle]:
     fields = _known(bundle, names)
     values = ", ".join(name if name in names else f"value.{name}" for name in fields)
     source = f"def replaced(value, {', '.join(names)}):\n    return bundle({values})\n"
-    return replaced_spelled(write_function("replaced", source, {"bundle": bundle}), bundle, names)
+    return spelled(write_function("replaced", source, {"bundle": bundle}), "replaced_spelled", bundle, names)
 
 
 def passing(bundle: type[Bundle], through: Callable[..., float], *names: str) -> Callable[[Bundle], Bundle]:

@@ -5,32 +5,27 @@ import closure of the kernel's module (`closure.py`), the types of its arguments
 and the versions of the compilers. It begins with a checksum of the rest. Files are looked for first among those that
 a wheel carries, which nobody writes, then in the user's cache (`FLOWNAV_CACHE`, `~/.cache/flownav`).
 
-What is damaged is compiled anew and replaced. A folder that cannot be written, or belongs to somebody else (a cache
-holds code that is run), is not used, which is said in one line on standard error.
+What is damaged is compiled anew and replaced. A folder that cannot be written, or that somebody else owns or may write
+to (a cache holds code that is run), is not used, which is said in one line on standard error.
 """
 
 import hashlib
 import inspect
 import os
-import pickle
 import platform
 import re
 import shutil
 import sys
 import time
 from collections.abc import Callable, Collection, Iterator
+from importlib.metadata import version
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-import llvmlite
-import numba
 import numpy as np
-from numba import types
-from numba.core.caching import _Cache
-from numba.core.typing.templates import Signature
 
-from flownav.core.compiling.closure import PACKAGE, Sources, is_foreign
-from flownav.core.compiling.target import target_description
+from flownav.core.compiling.closure import OWN_FILE, OWN_FOLDER, PACKAGE, Sources, distrusted
+from flownav.core.compiling.level import target_description
 from flownav.core.files import written_whole
 
 MAGIC = b"flownav kernel 1\n"
@@ -38,7 +33,7 @@ SUFFIX = ".kernel"
 UNUSED_DAYS = 60.0
 SHIPPED = PACKAGE / "kernels"
 VERSIONS = (
-    f"numba {numba.__version__}, llvmlite {llvmlite.__version__}, numpy {'.'.join(np.__version__.split('.')[:2])}, "
+    f"numba {version('numba')}, llvmlite {version('llvmlite')}, numpy {'.'.join(np.__version__.split('.')[:2])}, "
     f"{platform.python_implementation()} {sys.version_info[0]}.{sys.version_info[1]}, {sys.platform}"
 )
 
@@ -73,8 +68,8 @@ class Store:
     def is_writable(self) -> bool:
         """Whether what is saved would be kept."""
         try:
-            self.own.mkdir(parents=True, exist_ok=True)
-            return self._usable and os.access(self.own, os.W_OK | os.X_OK) and not is_foreign(self.own.stat())
+            self._make()
+            return self._usable and os.access(self.own, os.W_OK | os.X_OK) and not distrusted(self.own.stat())
         except OSError:
             return False
 
@@ -83,15 +78,21 @@ class Store:
         if not self._usable:
             return
         try:
-            self.own.mkdir(parents=True, exist_ok=True)
-            if is_foreign(self.own.stat()):
-                self._give_up("it belongs to another user")
+            self._make()
+            if why := distrusted(self.own.stat()):
+                self._give_up(why)
                 return
             with written_whole(self.own / name) as file:
+                file.touch(OWN_FILE)
                 file.write_bytes(MAGIC + hashlib.sha256(payload).digest() + payload)
             self._prune()
         except OSError as error:
             self._give_up(error.strerror or str(error))
+
+    def _make(self) -> None:
+        """Make the folder, which nobody else may write to whatever the umask."""
+        self.own.parent.mkdir(parents=True, exist_ok=True)
+        self.own.mkdir(OWN_FOLDER, exist_ok=True)
 
     def damaged(self, name: str, why: str) -> None:
         """Say that a file is damaged; it is compiled anew and replaced."""
@@ -100,8 +101,8 @@ class Store:
     def _read(self, path: Path, shipped: bool) -> bytes | None:
         try:
             with path.open("rb") as file:
-                if not shipped and (is_foreign(os.fstat(file.fileno())) or is_foreign(self.own.stat())):
-                    self._give_up("it belongs to another user")
+                if not shipped and (why := distrusted(os.fstat(file.fileno())) or distrusted(self.own.stat())):
+                    self._give_up(why)
                     return None
                 content = file.read()
             if not shipped:
@@ -152,85 +153,36 @@ def depends_also(module: str, laws: Collection[Callable[..., Any]], said: str) -
     STORE.sources.extend(module, others, f"{said} {generated}")
 
 
-class KernelCache(_Cache):
-    """Numba's interface to the store, for one function with these constants."""
+def file_name(function: Callable[..., Any], constants: dict[str, Any], kinds: str) -> str | None:
+    """The name of a function's file: everything that its code depends on, hashed; None if that is unknown.
 
-    def __init__(self, function: Callable[..., Any], constants: dict[str, Any]) -> None:
-        self._function = function
-        self._constants = constants
-
-    @property
-    def cache_path(self) -> str:
-        """The folder, as Numba's statistics show it."""
-        return str(STORE.own)
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compiled function of this signature, or None: it must be compiled."""
-        name = self.file_name(sig)
-        payload = STORE.load(name) if name is not None else None
-        if name is None or payload is None:
-            return None
-        try:
-            reduced = pickle.loads(payload)
-            return numba.core.compiler.CompileResult._rebuild(target_context, *reduced)
-        except Exception as error:
-            STORE.damaged(name, type(error).__name__)
-            return None
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a compiled function, unless it holds addresses of this process."""
-        name = self.file_name(sig)
-        if name is None or data.lifted or data.library.has_dynamic_globals:
-            return
-        data = data._replace(type_annotation="")  # a listing of the whole function, of no use to anybody
-        STORE.save(name, numba.core.serialize.dumps(data._reduce()))
-
-    def file_name(self, sig: Any) -> str | None:
-        """The name of this function's file: everything that its code depends on, hashed; None if that is unknown."""
-        stamp = STORE.sources.stamp(set(_modules(self._function, self._constants)))
-        inner = inspect.getclosurevars(self._function).nonlocals
-        described = f"{_described(sig)} {_constant(self._constants)} {_constant(dict(inner))}"
-        if stamp is None or " at 0x" in described:
-            return None
-        function = f"{self._function.__module__}.{self._function.__qualname__}"
-        file = self._function.__code__.co_filename
-        generated = file if file.startswith("<") else ""  # such a name holds a hash of the source
-        everything = "\n".join([function, generated, stamp, described, target_description(), VERSIONS])
-        readable = re.sub(r"[^A-Za-z0-9_.]", "", function.removeprefix("flownav."))
-        return f"{readable}-{hashlib.sha256(everything.encode()).hexdigest()[:24]}{SUFFIX}"
-
-    def enable(self) -> None:
-        """Numba's switch; this cache is always on."""
-
-    def disable(self) -> None:
-        """Numba's switch; this cache is always on."""
-
-    def flush(self) -> None:
-        """Numba's broom; nothing here goes stale."""
+    kinds: the types of its arguments in words (`words`).
+    """
+    stamp = STORE.sources.stamp(set(_modules(function, constants)))
+    inner = inspect.getclosurevars(function).nonlocals
+    described = f"{kinds} {_constant(constants)} {_constant(dict(inner))}"
+    if stamp is None or " at 0x" in described:
+        return None
+    name = f"{function.__module__}.{function.__qualname__}"
+    file = function.__code__.co_filename
+    generated = file if file.startswith("<") else ""  # such a name holds a hash of the source
+    everything = "\n".join([name, generated, stamp, described, target_description(), VERSIONS])
+    readable = re.sub(r"[^A-Za-z0-9_.]", "", name.removeprefix("flownav."))
+    return f"{readable}-{hashlib.sha256(everything.encode()).hexdigest()[:24]}{SUFFIX}"
 
 
 def _modules(function: Callable[..., Any], constants: dict[str, Any]) -> Iterator[str]:
     """The function's module; those of the functions and classes it names, which matter if it is a generated one."""
     yield "flownav.core.compile"
+    yield "flownav.core.compiling.compiler"
+    yield "flownav.core.compiling.taught"
+    yield "flownav.core.compiling.spelled"
     yield function.__module__
     named = [function.__globals__.get(name) for name in function.__code__.co_names]
     for value in [*named, *constants.values(), *inspect.getclosurevars(function).nonlocals.values()]:
         module = value.__name__ if inspect.ismodule(value) else getattr(value, "__module__", None)
         if isinstance(module, str) and module.split(".")[0] == PACKAGE.name:
             yield module
-
-
-def _described(kind: Any) -> str:
-    """A Numba type, or a tuple of them, in words that are the same in every process; classes by module and fields."""
-    if isinstance(kind, tuple):
-        return "(" + ", ".join(map(_described, kind)) + ")"
-    if isinstance(kind, types.BaseTuple):
-        parts = ", ".join(_described(part) for part in cast(Any, kind))
-        cls = getattr(kind, "instance_class", tuple)
-        return f"{cls.__module__}.{cls.__qualname__}[{', '.join(getattr(cls, '_fields', ()))}: {parts}]"
-    if isinstance(kind, Signature):
-        return f"{_described(kind.args)} -> {_described(kind.return_type)}"
-    return str(kind)
 
 
 def _constant(value: Any) -> str:

@@ -12,6 +12,7 @@ import os
 import sys
 import time
 from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,13 +21,18 @@ from flownav.core.files import written_whole
 PACKAGE = Path(__file__).parents[2]
 LIBRARIES = tuple({sys.prefix, sys.base_prefix, sys.exec_prefix})
 INSTALLED = frozenset({"site-packages", "dist-packages"})
+OTHERS_WRITE = 0o022  # of group and others, in a mode
+OWN_FILE, OWN_FOLDER = 0o600, 0o700  # modes of what is kept, whatever the umask
 REMEMBERED_FILES = 2000
 START_S = time.time()
 # imported by every kernel's module through `flownav.core.compile`, and nothing in machine code comes from them
 WITHOUT_CODE = {
     "flownav.core.files",
     "flownav.core.guard",
-    *(f"flownav.core.compiling.{part}" for part in ("beside", "cache", "closure", "progress")),
+    *(
+        f"flownav.core.compiling.{part}"
+        for part in ("beside", "cache", "closure", "declared", "loaded", "progress", "words")
+    ),
 }
 
 
@@ -46,6 +52,7 @@ class Sources:
         self._learnt = False
         self._stamps: dict[frozenset[str], str | None] = {}
         self._more: dict[str, tuple[str, frozenset[str]]] = {}
+        self._seen: dict[str, tuple[tuple[int, int], Source]] = {}
 
     def extend(self, module: str, more: Iterable[str], said: str) -> None:
         """From now on a module also has in it what these others have, and what is said; in this process only."""
@@ -59,8 +66,10 @@ class Sources:
         waiting = list(modules)
         while waiting:
             module = waiting.pop()
+            if module in found or module in WITHOUT_CODE:
+                continue
             file = source_file(module)
-            if module not in found and module not in WITHOUT_CODE and file is not None:
+            if file is not None:
                 source = self._read(file, module)
                 text, more = self._more.get(module, ("", ()))
                 found[module] = source.digest + text
@@ -83,6 +92,14 @@ class Sources:
         return self._stamps[wanted]
 
     def _read(self, file: Path, module: str) -> Source:
+        """What a module's file contributes; it is read again when it has changed."""
+        status = os.stat(file)
+        state = status.st_mtime_ns, status.st_size
+        if self._seen.get(module, (None,))[0] != state:
+            self._seen[module] = state, self._parsed(file, module)
+        return self._seen[module][1]
+
+    def _parsed(self, file: Path, module: str) -> Source:
         content = file.read_bytes()
         key = hashlib.sha256(f"{module} {file.name} ".encode() + content).hexdigest()[:32]
         if self._known is None:
@@ -100,6 +117,7 @@ class Sources:
         newest = list(self._known.items())[-REMEMBERED_FILES:]
         try:
             with written_whole(self._memory) as file:
+                file.touch(OWN_FILE)
                 file.write_text(json.dumps(dict(newest)), encoding="utf-8")
         except OSError:
             pass
@@ -108,7 +126,7 @@ class Sources:
 def _recalled(memory: Path) -> dict[str, Source]:
     """What an earlier process has written, nothing where that is missing or damaged."""
     try:
-        if is_foreign(memory.stat()):
+        if distrusted(memory.stat()):
             return {}
         entries = json.loads(memory.read_bytes())
         return {key: Source(str(digest), tuple(map(str, imports))) for key, (digest, imports) in entries.items()}
@@ -116,9 +134,13 @@ def _recalled(memory: Path) -> dict[str, Source]:
         return {}
 
 
-def is_foreign(status: os.stat_result) -> bool:
-    """Whether somebody other than this user and root owns a file, who could put anything into it."""
-    return hasattr(os, "geteuid") and status.st_uid not in (0, os.geteuid())
+def distrusted(status: os.stat_result) -> str:
+    """Why somebody other than this user and root could put anything into a file or a folder; "" where nobody could."""
+    if not hasattr(os, "geteuid"):
+        return ""
+    if status.st_uid not in (0, os.geteuid()):
+        return "it belongs to another user"
+    return "others may write to it: `chmod -R go-w`" if status.st_mode & OTHERS_WRITE else ""
 
 
 def _changed_since_start(module: str) -> bool:
@@ -129,13 +151,19 @@ def _changed_since_start(module: str) -> bool:
 def source_file(module: str) -> Path | None:
     """The source file of a module of this package, or of one outside that is no library's (a script, a test)."""
     if module.split(".")[0] == PACKAGE.name:
-        path = PACKAGE.joinpath(*module.split(".")[1:])
-        candidates = [path / "__init__.py", *([path.with_suffix(".py")] if path != PACKAGE else [])]
-        return next((candidate for candidate in candidates if candidate.is_file()), None)
+        return _own_source(module)
     file = getattr(sys.modules.get(module), "__file__", None)
     if file is None or not file.endswith(".py") or is_of_library(file) or not Path(file).is_file():
         return None
     return Path(file)
+
+
+@cache
+def _own_source(module: str) -> Path | None:
+    """The source file of a module of this package."""
+    path = PACKAGE.joinpath(*module.split(".")[1:])
+    candidates = [path / "__init__.py", *([path.with_suffix(".py")] if path != PACKAGE else [])]
+    return next((candidate for candidate in candidates if candidate.is_file()), None)
 
 
 def is_of_library(file: str) -> bool:

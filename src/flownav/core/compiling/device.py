@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from functools import cache
 from typing import Any, NamedTuple
 
+from flownav.core.compiling.declared import begin_compiling
 from flownav.core.compiling.engine import EQUATIONS
 from flownav.core.compiling.pointers import invoke
 from flownav.core.compiling.strided import teach_strided_pointers
@@ -53,6 +54,7 @@ def lowered(function: Callable[..., None], arguments: tuple[Any, ...], capabilit
     from numba.core import types
     from numba.cuda.compiler import compile_cuda, kernel_fixup
 
+    begin_compiling()
     asked = (*capability, "")
     with _device_named(asked):
         teach_equations()

@@ -1,24 +1,20 @@
-"""Equations, procedures and kernels: what is compiled, how, and where it is kept."""
+"""Equations, procedures and kernels: what is compiled, and when. Numba is imported to compile, and not before."""
 
+import inspect
+import os
 from collections.abc import Callable
+from functools import update_wrapper
+from importlib import import_module
 from typing import Any, TypeVar, cast
 
-import numba
 import numpy as np
-from numba.core.dispatcher import _FunctionCompiler  # type: ignore[attr-defined]
-from numba.core.errors import NumbaError
-from numba.core.registry import CPUDispatcher
-from numba.extending import overload, register_jitable
 
-from flownav.core.compiling import target
-from flownav.core.compiling.cache import STORE, KernelCache
-from flownav.core.compiling.handed import hand_over_whole
-from flownav.core.compiling.pipeline import LeanCompiler
-from flownav.core.compiling.progress import compiling
+from flownav.core.compiling.cache import STORE, file_name
+from flownav.core.compiling.declared import begin_compiling, when_compiling
+from flownav.core.compiling.loaded import python_function
+from flownav.core.compiling.words import words_of
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-
-hand_over_whole()
 
 LANES_WIDE = 16
 MOST_SPARED = 8  # calls of a kernel that are left to Python, together about as long as compiling it
@@ -26,65 +22,101 @@ FEW_STEPS = 5000  # a tenth of a second in Python: a flight, not a block of them
 
 EQUATIONS: dict[Callable[..., Any], bool] = {}  # every equation (True) and procedure (False): another target's compiler
 
-# what only kernels call needs no entry for Python and for C, which would take as long to compile as a short law
-UNWRAPPED: dict[str, Any] = {
-    "error_model": "numpy",
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-    "pipeline_class": LeanCompiler,
-}
-ENTRY = {"nopython": True, "nogil": True, "error_model": "numpy", "boundscheck": None, "no_cfunc_wrapper": True}
-
 
 def equation(function: Function) -> Function:
     """A scalar law: plain Python where Python calls it, compiled and inlined where a kernel does."""
     EQUATIONS[function] = True
-    return register_jitable(forceinline=True, **UNWRAPPED)(function)
+    _tell("compiler", "inlined", function)
+    return function
 
 
 def stands_for(law: Callable[..., Any], function: Function) -> Function:
     """A function that Python calls as it is, where kernels inline the law (what it wraps)."""
     EQUATIONS[function] = True
-    options: Any = {"forceinline": True, **UNWRAPPED}
-    overload(function, jit_options=options, strict=False)(lambda *_: law)
+    _tell("compiler", "inlined_for", law, function)
+    return function
+
+
+def spelled(function: Function, how: str, *told: Any) -> Function:
+    """A function that kernels get as instructions, which `how` of the module `spelled` writes, told this much."""
+    EQUATIONS[function] = True  # another target's compiler compiles the Python function
+    _tell("spelled", how, function, *told)
     return function
 
 
 def procedure(function: Function) -> Function:
     """An equation too long to be inlined: kernels call it, and it is compiled once for each type of its arguments."""
     EQUATIONS[function] = False
-    return register_jitable(**UNWRAPPED)(function)
+    _tell("compiler", "called", function)
+    return function
 
 
 def kernel(function: Function) -> Function:
     """An entry point built from equations: releases the lock, cached on disk."""
-    return function if getattr(numba.config, "DISABLE_JIT", False) else cast(Function, Kernel(function))
+    return function if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0" else cast(Function, Kernel(function))
 
 
-class Kernel(CPUDispatcher):
-    """Numba's dispatcher with our target and our cache, which says what it compiles."""
+def _tell(module: str, how: str, *told: Any) -> None:
+    """Tell Numba, before anything is compiled, by a function of one of the modules that have it."""
+    when_compiling(lambda: getattr(import_module(f"flownav.core.compiling.{module}"), how)(*told))
 
-    def __init__(self, py_func: Callable[..., Any]) -> None:
-        super().__init__(py_func, targetoptions=dict(ENTRY))
-        self._compiler = _KernelCompiler(py_func, self.targetdescr, self.targetoptions, {}, LeanCompiler)
-        self._cache = KernelCache(py_func, {})
+
+def compiler() -> Any:
+    """The module that has Numba, told of every equation."""
+    begin_compiling()
+    return import_module("flownav.core.compiling.compiler")
+
+
+class Kernel:
+    """A function and, for each type of its arguments, what was compiled of it: loaded where it was kept.
+
+    py_func: the function in Python. dispatcher: Numba's, made at the first compilation; it also serves kernels that
+    call this one.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        update_wrapper(self, function)
+        self.py_func = function
+        self._count = len(inspect.signature(function).parameters)
+        self._entries: dict[str, Callable[..., Any]] = {}
+        self._dispatcher: Any = None
         self._spared = 0
 
-    def compile(self, sig: Any) -> Any:
-        """The entry for arguments of these types: known, loaded or compiled."""
-        return without_surprises(lambda: super(Kernel, self).compile(sig))
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        """Run the compiled code, which is loaded or compiled for such arguments at the first call."""
+        kinds = None if named or len(arguments) != self._count else words_of(arguments)
+        if kinds is None:
+            return self.dispatcher(*arguments, **named)
+        entry = self._entries.get(kinds) or self._entry(kinds, arguments)
+        return entry(*arguments)
+
+    @property
+    def dispatcher(self) -> Any:
+        """Numba's dispatcher of this function."""
+        if self._dispatcher is None:
+            self._dispatcher = compiler().Dispatcher(self.py_func)
+        return self._dispatcher
 
     def prepare(self, *arguments: Any) -> None:
         """Load or compile the entry for such arguments, and do not run it."""
-        self.compile(self._kinds(arguments))
+        kinds = words_of(arguments)
+        if kinds is None:
+            self.dispatcher.prepare(*arguments)
+        elif kinds not in self._entries:
+            self._entry(kinds, arguments)
 
     def is_ready(self, *arguments: Any) -> bool:
         """Whether the entry for such arguments is compiled or loaded already."""
-        return self._kinds(arguments) in self.overloads
+        return words_of(arguments) in self._entries
 
     def file_name(self, *arguments: Any) -> str | None:
         """The name of that entry's file in the cache; None where it cannot be kept."""
-        return self._cache.file_name(self._kinds(arguments))
+        kinds = words_of(arguments)
+        return None if kinds is None else file_name(self.py_func, {}, kinds)
+
+    def files(self) -> list[str | None]:
+        """The names of the files of all entries that are ready."""
+        return [file_name(self.py_func, {}, kinds) for kinds in self._entries]
 
     def spare(self, *arguments: Any) -> bool:
         """Whether to do without the entry for such arguments: it is neither at hand nor has been spared often."""
@@ -94,8 +126,14 @@ class Kernel(CPUDispatcher):
         self._spared += 1
         return file is None or not STORE.holds(file)
 
-    def _kinds(self, arguments: tuple[Any, ...]) -> tuple[Any, ...]:
-        return tuple(map(self.typeof_pyval, arguments))
+    def _entry(self, kinds: str, arguments: tuple[Any, ...]) -> Callable[..., Any]:
+        """What runs such arguments: machine code that was kept, or Numba's dispatcher once it has compiled it."""
+        entry: Callable[..., Any] | None = python_function(file_name(self.py_func, {}, kinds))
+        if entry is None:
+            self.dispatcher.prepare(*arguments)
+            entry = self.dispatcher
+        self._entries[kinds] = entry
+        return entry
 
 
 def sparingly(kernel: Callable[..., Any], steps: int, *arguments: Any) -> Any:
@@ -104,26 +142,3 @@ def sparingly(kernel: Callable[..., Any], steps: int, *arguments: Any) -> Any:
         return kernel(*arguments)
     with np.errstate(all="ignore"):
         return kernel.py_func(*arguments)
-
-
-class _KernelCompiler(_FunctionCompiler):  # type: ignore[misc]
-    """Numba's compiler of one function, which says that it is at work."""
-
-    def _compile_core(self, args: Any, return_type: Any) -> Any:
-        with compiling(self.py_func.__name__):
-            return super()._compile_core(args, return_type)
-
-
-def without_surprises(compile_it: Callable[[], Any]) -> Any:
-    """Compile the lean way; where Numba's inside is not what that needs, the plain way, from then on.
-
-    What fails either way is the fault of what was to be compiled, and changes nothing.
-    """
-    try:
-        with target.lean():
-            return compile_it()
-    except (AttributeError, TypeError, AssertionError, KeyError, ImportError) as error:
-        if isinstance(error, NumbaError) or not target.is_lean():
-            raise
-        with target.plainly(error), target.lean():
-            return compile_it()

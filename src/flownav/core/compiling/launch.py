@@ -18,7 +18,8 @@ import numpy as np
 
 from flownav.core.compiling import device
 from flownav.core.compiling.bundles import write_function
-from flownav.core.compiling.cache import STORE, SUFFIX, KernelCache
+from flownav.core.compiling.cache import STORE, SUFFIX, file_name
+from flownav.core.compiling.compiler import described
 from flownav.core.compiling.device import Capability, DeviceCode, call_instead, compile_for_device
 from flownav.core.compiling.progress import compiling
 from flownav.core.compiling.strided import WARP, Constants, NoDeviceError
@@ -209,7 +210,7 @@ def _file_name(
     """The name of its file in the cache; None where it cannot be kept."""
     import numba_cuda
 
-    host = KernelCache(function, constants).file_name(kinds)
+    host = file_name(function, constants, described(kinds))
     if host is None:
         return None
     stem, digest = host.removesuffix(SUFFIX).rsplit("-", 1)

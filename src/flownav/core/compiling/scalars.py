@@ -9,9 +9,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic, overload
 
 from flownav.core.compiling.engine import equation
 
@@ -55,32 +52,6 @@ def float_from_bits(bits: Any) -> float:
 def bits_from_float(value: float) -> Any:
     """The 64 bits (uint64) of a float64."""
     return np.uint64(struct.unpack("<Q", struct.pack("<d", value))[0])
-
-
-@intrinsic
-def _bitcast_to_float(typing_context: Any, bits: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.bitcast(arguments[0], ir.DoubleType())
-
-    return types.float64(types.uint64), generate
-
-
-@intrinsic
-def _bitcast_to_bits(typing_context: Any, value: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.bitcast(arguments[0], ir.IntType(64))
-
-    return types.uint64(types.float64), generate
-
-
-@overload(float_from_bits, inline="always")
-def _compiled_float_from_bits(bits):  # type: ignore[no-untyped-def]
-    return lambda bits: _bitcast_to_float(bits)  # type: ignore[call-arg]
-
-
-@overload(bits_from_float, inline="always")
-def _compiled_bits_from_float(value):  # type: ignore[no-untyped-def]
-    return lambda value: _bitcast_to_bits(value)  # type: ignore[call-arg]
 
 
 STAGES = 4

@@ -14,8 +14,6 @@ from numba import types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import lower_builtin
 
-from flownav.core.compiling.engine import EQUATIONS
-
 
 def load_spelled(function: Callable[..., Any], bundle: type, rows: tuple[int, ...] | None) -> Callable[..., Any]:
     """`load(work, lanes, lane)` of the generated Python function; rows None: the first is told, before the lane."""
@@ -33,19 +31,24 @@ def load_spelled(function: Callable[..., Any], bundle: type, rows: tuple[int, ..
 
 
 def store_spelled(function: Callable[..., Any], bundle: type, rows: tuple[int, ...] | None) -> Callable[..., Any]:
-    """`store(work, lanes, lane, value)` likewise."""
+    """`store(work, lanes, lane, value)` likewise; fields that the value leaves out are stored by their defaults."""
     fields: tuple[str, ...] = bundle._fields  # type: ignore[attr-defined]
+    defaults: dict[str, float] = bundle._field_defaults  # type: ignore[attr-defined]
 
     def typed(work: Any, lanes: Any, *told: Any) -> Any:
         *places, value = told
-        if getattr(value, "fields", ()) != fields:
+        if getattr(value, "fields", ()) != fields or not set(fields[len(value) :]) <= set(defaults):
             return None
         return signature(types.none, work, lanes, *(types.intp for _ in places), value)
 
     def lowered(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         at = _places(context, builder, sig, args[0], args[2:-1], rows, len(fields))
-        for i, (place, kind) in enumerate(zip(at, sig.args[-1], strict=True)):
-            number = context.cast(builder, builder.extract_value(args[-1], i), kind, types.float64)
+        kinds = list(sig.args[-1])
+        for i, place in enumerate(at):
+            if i < len(kinds):
+                number = context.cast(builder, builder.extract_value(args[-1], i), kinds[i], types.float64)
+            else:  # Numba makes a named tuple of what it is told: the rest is by default
+                number = context.get_constant(types.float64, defaults[fields[i]])
             builder.store(number, place)
         return context.get_dummy_value()
 
@@ -100,8 +103,6 @@ def _on_work(typed: Callable[..., Any]) -> Callable[..., Any]:
 def _spelled(
     function: Callable[..., Any], typed: Callable[..., Any], lowered: Callable[..., Any]
 ) -> Callable[..., Any]:
-    EQUATIONS[function] = True  # another target's compiler compiles the Python function
-
     class Spelled(AbstractTemplate):
         """Its type."""
 

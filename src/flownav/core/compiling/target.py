@@ -10,21 +10,16 @@ functions that only kernels call this is waste. Inside `lean()`
   itself for callers on sixteen lanes, which vectorise better then, and not for those on one lane: that is two of three;
 - only an entry (what Python or C calls) is turned into machine code, by one pipeline: Numba's first one gathers
   reference counts, which kernels do not have.
-
-Kernels are made for a *processor level* (x86-64-v3 with 256-bit vectors, x86-64-v4 with 512) rather than for this very
-processor, so that they can be shipped; a processor of no such level gets code of its own. `FLOWNAV_LEVEL` names a level
-to compile for, which this machine need not have.
 """
 
 from __future__ import annotations
 
 import gc
-import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache, cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numba
 from llvmlite import binding as llvm
@@ -35,6 +30,7 @@ from numba.core.environment import lookup_environment
 from numba.core.registry import cpu_target
 from numba.core.runtime.nrt import rtsys
 
+from flownav.core.compiling.level import LLVM_OPTIONS, Leanness, level
 from flownav.core.compiling.loops import has_loop, jumps_back
 from flownav.core.compiling.remembered import remembering
 
@@ -42,56 +38,8 @@ COLLECT_AFTER = 50_000  # objects; Python's own 700 costs a tenth of the time of
 ENVIRONMENT_SYMBOL = "_ZN08NumbaEnv"
 ONE_LANE_MARKS = "UniTupleIxLi1EE", "UniTuple_28int64_20x_201_29"  # `ONE_LANE` in a function's name, in a record's
 
-# A lane loop must reach the vectoriser as a loop. Left alone, LLVM fully unrolls one whose body is still a
-# call (equations are inlined later) and the lanes come out scalar; loops of 8 and fewer may unroll.
-# No loop is unrolled in part: loops over states, whose bounds are known, would be, for no speed and half the compile
-# time (landing filter, scalar / 16 lanes: 50 / 69 -> 35 / 36 CPU s at the same 34 / 285 ms a block).
-LLVM_OPTIONS = ("--unroll-full-max-count=8", "--unroll-max-count=1")
 for _option in LLVM_OPTIONS:
     llvm.set_option("flownav", _option)
-
-
-class Level(NamedTuple):
-    """A processor as LLVM knows it."""
-
-    name: str
-    cpu: str
-    features: str
-
-
-# 512-bit vectors are asked for where they exist: LLVM prefers 256 bits by default (measured 15 % slower)
-LEVELS = {
-    "x86-64-v3": Level("x86-64-v3", "x86-64-v3", ""),
-    "x86-64-v4": Level("x86-64-v4", "x86-64-v4", "-prefer-256-bit"),
-}
-# the marks of each level, highest first (x86-64 psABI, 1.0, table 3.1)
-MARKS = {
-    "x86-64-v4": ("avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"),
-    "x86-64-v3": ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "xsave"),
-}
-
-
-@cache
-def level() -> Level:
-    """The level that kernels are compiled for in this process."""
-    asked = os.environ.get("FLOWNAV_LEVEL")
-    if asked in LEVELS:
-        return LEVELS[asked]
-    features = llvm.get_host_cpu_features()
-    if asked != "host" and llvm.get_process_triple().startswith("x86_64"):
-        below = all(features.get(mark) for mark in MARKS["x86-64-v3"])
-        if below:
-            wide = all(features.get(mark) for mark in MARKS["x86-64-v4"])
-            return LEVELS["x86-64-v4" if wide else "x86-64-v3"]
-    wider = ",-prefer-256-bit" if features.get("avx512f") else ""
-    return Level("host", llvm.get_host_cpu_name(), features.flatten() + wider)
-
-
-def target_description() -> str:
-    """Everything about the target and the optimiser that machine code depends on, in words."""
-    return (
-        f"{llvm.get_process_triple()} {' '.join(level())} {' '.join(LLVM_OPTIONS)} {'lean' if is_lean() else 'plain'}"
-    )
 
 
 class LeanLibrary(JITCodeLibrary):
@@ -257,26 +205,20 @@ class LeanCodegen(JITCPUCodegen):
             super().set_env(env_name, env)
 
 
-class _Leanness:
-    """Whether functions are compiled as `LeanLibrary` does, or as Numba does by itself."""
-
-    wanted = not os.environ.get("FLOWNAV_PLAIN")
-
-
 def is_lean() -> bool:
     """Whether this version of Numba is built as `LeanLibrary` supposes; `FLOWNAV_PLAIN=1` says no."""
     parts = ("_finalize_final_module", "_raise_if_finalized", "_get_module_for_linking", "_optimize_functions")
-    return _Leanness.wanted and all(hasattr(JITCodeLibrary, part) for part in parts)
+    return Leanness.wanted and all(hasattr(JITCodeLibrary, part) for part in parts)
 
 
 @contextmanager
 def plainly(error: Exception) -> Iterator[None]:
     """Compile as Numba does by itself inside the block, and from then on if that succeeds where the lean way failed."""
-    _Leanness.wanted = False
+    Leanness.wanted = False
     try:
         yield
     except BaseException:
-        _Leanness.wanted = True
+        Leanness.wanted = True
         raise
     why = f"{type(error).__name__}: {error}".splitlines()[0]
     print(f"flownav: Numba {numba.__version__} compiles the slow way here ({why})", file=sys.stderr, flush=True)

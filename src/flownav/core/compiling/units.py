@@ -10,22 +10,17 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import types
-from numba.core.ccallback import _CFuncCompiler  # type: ignore[attr-defined]
-from numba.core.registry import cpu_target
 
-from flownav.core.compiling.cache import KernelCache
-from flownav.core.compiling.engine import without_surprises
-from flownav.core.compiling.pipeline import LeanCompiler
-from flownav.core.compiling.progress import compiling
+from flownav.core.compiling.cache import file_name
+from flownav.core.compiling.engine import compiler
+from flownav.core.compiling.loaded import c_function
+from flownav.core.compiling.words import words_of_letters
 
-OPTIONS = {"error_model": "numpy"}
-
-LETTERS = {
-    "p": (types.CPointer(types.float64), ctypes.c_void_p, np.float64),
-    "q": (types.CPointer(types.int64), ctypes.c_void_p, np.int64),
-    "d": (types.float64, ctypes.c_double, None),
-    "i": (types.int64, ctypes.c_int64, None),
+LETTERS: dict[str, tuple[Any, Any]] = {  # as C takes them, and as arrays have them
+    "p": (ctypes.c_void_p, np.float64),
+    "q": (ctypes.c_void_p, np.int64),
+    "d": (ctypes.c_double, None),
+    "i": (ctypes.c_int64, None),
 }
 
 
@@ -41,8 +36,6 @@ class Unit:
         self.constants = constants
         self.__name__ = function.__name__
         self.__doc__ = function.__doc__
-        self._signature = types.void(*(LETTERS[letter][0] for letter in self.letters))
-        self._keeper = KernelCache(function, constants)
         self._lock = threading.RLock()
         self._entry: Any = None
 
@@ -58,7 +51,7 @@ class Unit:
 
     def file_name(self) -> str | None:
         """The name of its file in the cache; None where it cannot be kept."""
-        return self._keeper.file_name(self._signature)
+        return file_name(self.function, self.constants, words_of_letters(self.letters))
 
     @property
     def address(self) -> int:
@@ -78,28 +71,20 @@ class Unit:
         """The address, and what Python calls; the third keeps the machine code alive."""
         with self._lock:
             if self._entry is None:
-                library, address = without_surprises(self._compile)
-                kinds = [LETTERS[letter][1] for letter in self.letters]
+                library, address = self._compile()
+                kinds = [LETTERS[letter][0] for letter in self.letters]
                 self._entry = address, ctypes.CFUNCTYPE(None, *kinds)(address), library
             return self._entry[0], self._entry[1]
 
     def _compile(self) -> tuple[Any, int]:
         """The library and the address of its C function, from the cache where it is there."""
-        signature, keeper = self._signature, self._keeper
-        result = keeper.load_overload(signature, cpu_target.target_context)
-        if result is not None:
-            return result.library, _address(result)
-        with compiling(self.__name__):
-            bound = bind_constants(self.function, self.constants)
-            compiler = _CFuncCompiler(bound, cpu_target, OPTIONS, {}, LeanCompiler)
-            result = compiler.compile(signature.args, signature.return_type)
-            address = _address(result)
-        keeper.save_overload(signature, result)
-        return result.library, address
-
-
-def _address(result: Any) -> int:
-    return int(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
+        address = c_function(self.file_name())
+        if address is not None:
+            return None, address
+        made: tuple[Any, int] = compiler().compile_unit(
+            self.function, lambda: bind_constants(self.function, self.constants), self.constants, self.letters
+        )
+        return made
 
 
 def unit(function: Callable[..., Any], signature: str, **constants: Any) -> Unit:
@@ -114,7 +99,7 @@ def unit(function: Callable[..., Any], signature: str, **constants: Any) -> Unit
 
 def _passed(letter: str, argument: Any) -> Any:
     """An argument as ctypes takes it; an array must be what the letter says."""
-    dtype = LETTERS[letter][2]
+    dtype = LETTERS[letter][1]
     if dtype is not None and isinstance(argument, np.ndarray):
         if argument.dtype != dtype or not argument.flags.c_contiguous:
             raise TypeError(f"'{letter}' takes a contiguous array of {np.dtype(dtype)}, not of {argument.dtype}")

@@ -14,6 +14,7 @@ import numpy as np
 from flownav.core.measurement import Array, Sensor
 from flownav.core.record import POSITION_NED, QUATERNION, Table
 from flownav.export.samples.flight import angles_of, changes, fixes_of, velocities_ned
+from flownav.logs.happened import MESSAGE, SOURCE_SET
 from flownav.logs.log import Log
 
 STRUCT = {
@@ -27,7 +28,7 @@ HEAD = b"\xa3\x95"
 FMT, FIRST_OWN = 128, 132  # types of messages: FMT's, and of those that a log defines itself
 BOOT_S = 20.0  # the vehicle's time since boot when the log's time 0 is
 GOOD, DOWNWARD, FIX_3D = 4, 25, 3
-LANDED, FLYING = 18, 28  # LogEvent
+LANDED, FLYING, FIRST_SET = 18, 28, 84  # LogEvent; the source sets 1 to 3 follow the last
 MILLIGAUSS_PER_GAUSS = 1e3
 SIMULATED_EVERY = 2  # rows of the truth
 
@@ -89,6 +90,9 @@ def define_flight(writer: DataFlashWriter) -> None:
     writer.define("EV", "QB", "TimeUS,Id", "s-", "F-")
     writer.define("PARM", "QNf", "TimeUS,Name,Value", "s--", "F--")
     writer.define("ORGN", "QBLLe", "TimeUS,Type,Lat,Lng,Alt", "s#---", "F----")
+    labels = "TimeUS,C,Roll,Pitch,Yaw,VN,VE,VD,dPD,PN,PE,PD,GX,GY,GZ,OH"
+    writer.define("XKF1", "QBccCfffffffccce", labels, "s#--------------", "F---------------")
+    writer.define("MSG", "QZ", "TimeUS,Message", "s-", "F-")
 
 
 def define_simulated(writer: DataFlashWriter) -> None:
@@ -122,10 +126,11 @@ def write_dataflash(log: Log, path: Path) -> None:
     define_flight(writer)
     define_simulated(writer)
     least_m, most_m = log.limits["range_m"]
-    assert log.origin_deg_m is not None
-    for name, value in (("RNGFND1_MIN_CM", 100.0 * least_m), ("RNGFND1_MAX_CM", 100.0 * most_m)):
+    stated = {"RNGFND1_MIN_CM": 100.0 * least_m, "RNGFND1_MAX_CM": 100.0 * most_m}
+    for name, value in (log.parameters or stated).items():
         writer.put("PARM", round(BOOT_S * 1e6), name, value)
-    writer.put("ORGN", round(BOOT_S * 1e6), 0, *log.origin_deg_m)
+    if log.origin_deg_m is not None:
+        writer.put("ORGN", round(BOOT_S * 1e6), 0, *log.origin_deg_m)
     for t_s, name, values in sorted(_rows(log), key=lambda row: row.t_s):
         writer.put(name, round((BOOT_S + t_s) * 1e6), *values)
     path.write_bytes(writer.content())
@@ -133,34 +138,52 @@ def write_dataflash(log: Log, path: Path) -> None:
 
 def _rows(log: Log) -> Iterator[Row]:
     """Every message, sensor by sensor."""
-    streams = log.streams
     for t_s, value in _of(log, Sensor.IMU):
         yield Row(t_s, "IMU", (0, *value, 1, 1))
-    flow = streams[Sensor.FLOW_RATE]
-    for (t_s, value), quality in zip(_of(log, Sensor.FLOW_RATE), np.rint(flow.quality).tolist(), strict=True):
-        yield Row(t_s, "OF", (quality, *value))
-    ranges = streams[Sensor.RANGE]
-    for (t_s, (distance,)), quality in zip(_of(log, Sensor.RANGE), ranges.quality.tolist(), strict=True):
+    for (t_s, value), quality in zip(_of(log, Sensor.FLOW_RATE), _qualities(log, Sensor.FLOW_RATE), strict=True):
+        yield Row(t_s, "OF", (round(quality), *value))
+    for (t_s, (distance,)), quality in zip(_of(log, Sensor.RANGE), _qualities(log, Sensor.RANGE), strict=True):
         yield Row(t_s, "RFND", (0, distance, GOOD if quality > 0.0 else 0, DOWNWARD))
     for t_s, (altitude,) in _of(log, Sensor.BARO):
         yield Row(t_s, "BARO", (0, altitude))
     for t_s, field in _of(log, Sensor.MAG):
         yield Row(t_s, "MAG", (0, *(round(MILLIGAUSS_PER_GAUSS * part) for part in field), 1))
-    yield from _fixes(log)
-    for t_s, landed in zip(*(column.tolist() for column in changes(log)), strict=True):
-        yield Row(t_s, "EV", (LANDED if landed else FLYING,))
+    if Sensor.GPS_POSITION in log.streams:
+        yield from _fixes(log)
+    if Sensor.LANDED in log.streams:
+        for t_s, landed in zip(*(column.tolist() for column in changes(log)), strict=True):
+            yield Row(t_s, "EV", (LANDED if landed else FLYING,))
+    for happened in log.happened:
+        if happened.kind == SOURCE_SET:
+            yield Row(happened.t_s, "EV", (FIRST_SET + int(happened.value),))
+        elif happened.kind == MESSAGE:
+            yield Row(happened.t_s, "MSG", (happened.text,))
     if log.autopilot is not None:
-        for t_s, angles in zip(
-            log.autopilot["t_s"].tolist(), np.degrees(angles_of(log.autopilot)).tolist(), strict=True
-        ):
-            yield Row(t_s, "ATT", tuple(angles))
+        yield from _estimated(log.autopilot)
     if log.truth is not None:
         yield from _simulated({name: column[::SIMULATED_EVERY] for name, column in log.truth.items()}, log)
 
 
 def _of(log: Log, sensor: Sensor) -> Iterator[tuple[float, list[float]]]:
+    if sensor not in log.streams:
+        return iter(())
     stream = log.streams[sensor]
     return zip(stream.t_s.tolist(), stream.value.tolist(), strict=True)
+
+
+def _qualities(log: Log, sensor: Sensor) -> list[float]:
+    return log.streams[sensor].quality.tolist() if sensor in log.streams else []
+
+
+def _estimated(own: Table) -> Iterator[Row]:
+    """ATT and XKF1: what the vehicle's own filter said."""
+    angles, velocity = np.degrees(angles_of(own)), velocities_ned(own)
+    turned = np.where(np.arange(3) == 2, angles % 360.0, angles)
+    place = np.column_stack([own[name] for name in POSITION_NED])
+    columns = np.column_stack([own["t_s"], angles, turned, velocity, velocity[:, 2], place])
+    for t_s, *values in columns.tolist():
+        yield Row(t_s, "ATT", tuple(values[:3]))
+        yield Row(t_s, "XKF1", (0, *values[3:], 0.0, 0.0, 0.0, 0.0))
 
 
 def _fixes(log: Log) -> Iterator[Row]:

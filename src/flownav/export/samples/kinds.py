@@ -1,92 +1,22 @@
-"""Which sample logs there are, what each holds, what to try with it, and how the plainer ones are written.
+"""Which sample logs there are, what each holds, and what to try with it.
 
-The folder of CSV files is what `logs/csv_folder.py` reads (docs/reference/csv-folder.md); a ground station's MAVLink
-log is what the simulated vehicle of `live` tells, a time before each frame.
-
-Last: they are written into a folder, each whole or not at all, and nothing that is there already is silently replaced.
+They are written into a folder, each whole or not at all, and nothing that is there already is silently replaced.
+What flies and writes them is loaded when one is written: `sample --list` and the command's help want only their names.
 """
 
+import hashlib
+import re
 import shutil
-import struct
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
-
-import numpy as np
 
 from flownav.core.errors import InputError
 from flownav.core.free_names import free_name
 from flownav.core.guard import an_output_folder
-from flownav.core.measurement import COLUMNS, Array, Sensor
-from flownav.core.record import POSITION_NED
-from flownav.export.samples.dataflash import write_dataflash
-from flownav.export.samples.flight import Fixes, angles_of, changes, fixes_of, sample_log, sample_record
-from flownav.export.samples.ulog import write_ulog
-from flownav.live.simulated import SimulatedVehicle
-from flownav.logs.log import Log
 
-MILLIGAUSS_PER_GAUSS = 1e3
-FIX_3D = 3.0
-Columns = dict[str, Array]
-START_US = 1_767_225_600_000_000  # 2026-01-01: of the ground station's clock, which no flight was flown by
-STEP_S = 0.002
-LINK_S = 0.004  # from the vehicle to the ground station
 RIG_HEIGHTS_M, RIG_RUNS = (0.6, 1.0), 2
-
-
-def write_csv_folder(log: Log, folder: Path) -> None:
-    """Write a file for each sensor of a log into a folder that is there."""
-    for name, columns in tables_of(log):
-        formats = ["%.9f" if key in ("lat_deg", "lon_deg") else "%.6f" if key == "t_s" else "%.9g" for key in columns]
-        line = ",".join(formats)
-        rows = np.column_stack(list(columns.values())).tolist()
-        text = "\n".join([",".join(columns), *(line % tuple(row) for row in rows)]) + "\n"
-        (folder / f"{name}.csv").write_text(text, encoding="utf-8", newline="\n")
-
-
-def tables_of(log: Log) -> Iterator[tuple[str, Columns]]:
-    """Name and columns of each file; the attitude is the one that the vehicle's autopilot flew on."""
-    if log.autopilot is not None:
-        own = log.autopilot
-        angles = zip(("roll_rad", "pitch_rad", "yaw_rad"), angles_of(own).T, strict=True)
-        yield "attitude", {"t_s": own["t_s"], **dict(angles)}
-    for name, sensor in (("imu", Sensor.IMU), ("flow", Sensor.FLOW_RATE), ("baro", Sensor.BARO)):
-        if sensor in log.streams:
-            stream = log.streams[sensor]
-            columns = {"t_s": stream.t_s, **dict(zip(COLUMNS[sensor], stream.value.T, strict=True))}
-            yield name, columns | ({"quality": stream.quality} if sensor == Sensor.FLOW_RATE else {})
-    if Sensor.GPS_POSITION in log.streams:
-        yield "gps", _gps(fixes_of(log))
-    if Sensor.RANGE in log.streams:
-        ranges = log.streams[Sensor.RANGE]
-        yield "range", {"t_s": ranges.t_s, "range_m": ranges.value[:, 0], "valid": (ranges.quality > 0.0).astype(float)}
-    if Sensor.MAG in log.streams:
-        field = log.streams[Sensor.MAG]
-        names = (f"mag_{axis}_mgauss" for axis in "xyz")
-        yield "mag", {"t_s": field.t_s, **dict(zip(names, MILLIGAUSS_PER_GAUSS * field.value.T, strict=True))}
-    if Sensor.LANDED in log.streams:
-        t_s, landed = changes(log)
-        yield "landed", {"t_s": t_s, "landed": landed}
-    if log.truth is not None:
-        place = {f"{axis}_m": log.truth[name] for axis, name in zip("xyz", POSITION_NED, strict=True)}
-        yield "truth", {"t_s": log.truth["t_s"], **place}
-        yield "heading_truth", {"t_s": log.truth["t_s"], "yaw_rad": angles_of(log.truth)[:, 2]}
-
-
-def _gps(fixes: Fixes) -> Columns:
-    velocity = dict(zip((f"vel_{axis}_m_s" for axis in "ned"), fixes.velocity_ned_m_s.T, strict=True))
-    place = {"lat_deg": fixes.lat_deg, "lon_deg": fixes.lon_deg, "alt_m": fixes.alt_m}
-    return {"t_s": fixes.t_s, "fix_type": np.full(len(fixes.t_s), FIX_3D), **place, **velocity}
-
-
-def write_tlog(log: Log, path: Path) -> None:
-    """Write a log as a .tlog. InputError where pymavlink is not installed."""
-    vehicle, parts = SimulatedVehicle(log), []
-    for t_s in np.arange(0.0, vehicle.end_s + STEP_S, STEP_S).tolist():
-        stamp = struct.pack(">Q", START_US + round((t_s + LINK_S) * 1e6))
-        parts += [stamp + frame for frame in vehicle.due(t_s, 0.0)]
-    path.write_bytes(b"".join(parts))
 
 
 class Sample(NamedTuple):
@@ -102,6 +32,38 @@ class Sample(NamedTuple):
     commands: tuple[str, ...]
     folder: bool = False
     uses: str = ""
+
+
+def _as_csv(seed: int, folder: Path) -> None:
+    from flownav.export.samples.flight import sample_log, write_csv_folder
+
+    write_csv_folder(sample_log(seed), folder)
+
+
+def _as_ulog(seed: int, path: Path) -> None:
+    from flownav.export.samples.flight import sample_log
+    from flownav.export.samples.ulog import write_ulog
+
+    write_ulog(sample_log(seed), path)
+
+
+def _as_tlog(seed: int, path: Path) -> None:
+    from flownav.export.samples.flight import sample_log, write_tlog
+
+    write_tlog(sample_log(seed), path)
+
+
+def _as_dataflash(seed: int, path: Path) -> None:
+    from flownav.export.samples.dataflash import write_dataflash
+    from flownav.export.samples.flight import sample_log
+
+    write_dataflash(sample_log(seed), path)
+
+
+def _as_record(seed: int, path: Path) -> None:
+    from flownav.export.samples.flight import sample_record
+
+    sample_record(seed).save(path, replacing=True)
 
 
 def _rig(seed: int, folder: Path) -> None:
@@ -121,21 +83,21 @@ def _rig(seed: int, folder: Path) -> None:
 SAMPLES = (
     Sample(
         "csv", "flight-csv", "a quadrotor's flight, one CSV file a sensor",
-        lambda seed, at: write_csv_folder(sample_log(seed), at),
+        _as_csv,
         ("flownav info {path}", "flownav replay {path} --gps-outage 30:75", "flownav identify {path}"), folder=True,
     ),
     Sample(
-        "ulog", "flight.ulg", "the same flight as a PX4 log", lambda seed, at: write_ulog(sample_log(seed), at),
+        "ulog", "flight.ulg", "the same flight as a PX4 log", _as_ulog,
         ("flownav info {path}", "flownav replay {path}", "flownav identify {path} --for px4"),
     ),
     Sample(
         "tlog", "flight.tlog", "the same flight as a ground station's MAVLink log",
-        lambda seed, at: write_tlog(sample_log(seed), at),
+        _as_tlog,
         ("flownav info {path}", "flownav replay {path}"), uses="live",
     ),
     Sample(
         "dataflash", "flight.bin", "the same flight as an ArduPilot log",
-        lambda seed, at: write_dataflash(sample_log(seed), at),
+        _as_dataflash,
         ("flownav info {path}", "flownav replay {path}", "flownav identify {path} --for ardupilot"),
     ),
     Sample(
@@ -144,7 +106,7 @@ SAMPLES = (
     ),
     Sample(
         "record", "pad_return.fnr", "a take-off from a pad and a landing on it, flownav's own record",
-        lambda seed, at: sample_record(seed).save(at, replacing=True),
+        _as_record,
         ("flownav report {path}", "flownav replay {path}", "flownav export {path} --to mcap"),
     ),
 )  # fmt: skip
@@ -160,6 +122,9 @@ def sample_of(kind: str) -> Sample:
 
 
 README = "README.txt"
+DIGESTS = "By these digests `flownav sample --force` knows what it may replace:"
+DIGEST_DIGITS = 32  # of a SHA-256's 64
+DIGEST_LINE = re.compile(r"^  ([0-9a-f]{32})  (\S+)$", re.MULTILINE)
 FIRST_LINE = "Sample logs, written by `flownav sample`."
 
 
@@ -195,24 +160,25 @@ def write_samples(
     found = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        ours = _is_ours(folder)
+        known = _known(folder)
         for sample in samples:
             with tempfile.TemporaryDirectory(prefix=".sample-", dir=folder) as place:
                 made = Path(place) / sample.name
                 if sample.folder:
                     made.mkdir()
                 sample.write(seed, made)
-                found.append(_put(sample, made, folder / sample.name, force=force, ours=ours))
+                found.append(_put(sample, made, folder / sample.name, force=force, known=known))
             on_written(found[-1])
-        if ours or not (folder / README).exists():
-            (folder / README).write_text(readme(seed), encoding="utf-8", newline="\n")
+        if known is not None or not (folder / README).exists():
+            digests = (known or {}) | {one.path.name: _digest(_content(one.path)) for one in found}
+            (folder / README).write_bytes(readme(seed, digests).encode())
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror}); give another name") from error
     return found
 
 
-def _put(sample: Sample, made: Path, path: Path, *, force: bool, ours: bool) -> Written:
-    """Move what was made to its place."""
+def _put(sample: Sample, made: Path, path: Path, *, force: bool, known: dict[str, str] | None) -> Written:
+    """Move what was made to its place. known: the digests of what flownav wrote into the folder before."""
     content, size = _content(made), sum(map(len, _content(made).values()))
     if path.is_symlink():
         raise InputError(f"{path}: cannot be written (nothing is written through a symbolic link); give another name")
@@ -225,7 +191,7 @@ def _put(sample: Sample, made: Path, path: Path, *, force: bool, ours: bool) -> 
         free = free_name(path)
         made.rename(free)
         return Written(sample, free, size, "written", path)
-    if not ours:
+    if known is None or known.get(path.name) != _digest(_content(path)):
         raise InputError(f"{path}: is there already and was not written by flownav, so it is not replaced")
     if path.is_dir():
         shutil.rmtree(path)
@@ -233,9 +199,21 @@ def _put(sample: Sample, made: Path, path: Path, *, force: bool, ours: bool) -> 
     return Written(sample, path, size, "replaced")
 
 
-def _is_ours(folder: Path) -> bool:
+def _known(folder: Path) -> dict[str, str] | None:
+    """Digests by name of what flownav wrote into a folder, as its README says; None where that is not ours."""
     readme = folder / README
-    return readme.is_file() and readme.read_text(encoding="utf-8", errors="replace").startswith(FIRST_LINE)
+    text = readme.read_text(encoding="utf-8", errors="replace") if readme.is_file() else ""
+    if not text.startswith(FIRST_LINE):
+        return None
+    return {found[2]: found[1] for found in DIGEST_LINE.finditer(text)}
+
+
+def _digest(content: dict[str, bytes]) -> str:
+    """The first half of SHA-256 of a file, or over the names and contents of a folder's files."""
+    own = hashlib.sha256()
+    for name, data in content.items():
+        own.update(f"{name} {hashlib.sha256(data).hexdigest()}\n".encode())
+    return own.hexdigest()[:DIGEST_DIGITS]
 
 
 def _content(path: Path) -> dict[str, bytes]:
@@ -244,13 +222,14 @@ def _content(path: Path) -> dict[str, bytes]:
     return {str(file.relative_to(path)): file.read_bytes() for file in files}
 
 
-def readme(seed: int) -> str:
-    """What the files are, in words."""
+def readme(seed: int, digests: Mapping[str, str]) -> str:
+    """What the files are, in words, and their digests by name, by which flownav knows them again."""
     lines = [FIRST_LINE, *ABOUT.format(seed=seed).splitlines(), ""]
     for sample in SAMPLES:
         lines += [f"{sample.name} ({sample.kind})", f"  {sample.what}. Try here:"]
         lines += [f"    {command.format(path=sample.name)}" for command in sample.commands]
         lines.append("")
+    lines += [DIGESTS, *(f"  {digest}  {name}" for name, digest in sorted(digests.items())), ""]
     return "\n".join(lines)
 
 

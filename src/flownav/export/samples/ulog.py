@@ -1,5 +1,6 @@
 """A log as PX4 would have written it: today's topics, in PX4's frames and units."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,8 @@ from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, QUATERNION, Table
 from flownav.export.samples.flight import changes, fixes_of, velocities_ned
 from flownav.export.trajectory import Stamps, stamps
-from flownav.export.ulog_topics import Field, Topic, assembled
+from flownav.export.ulog_topics import Field, Topic, assembled, logged
+from flownav.logs.happened import FUSES_FLOW, MESSAGE
 from flownav.logs.log import Log
 
 BOOT_S = 20.0  # the vehicle's time since boot when the log's time 0 is
@@ -17,22 +19,22 @@ DOWNWARD_ROTATION = 25  # MAV_SENSOR_ROTATION_PITCH_270
 SYSTEM = "flownav simulator"
 
 
-def write_ulog(log: Log, path: Path) -> None:
-    """Write a log as a ULog file."""
-    path.write_bytes(assembled(topics_of(log), [], {"sys_name": SYSTEM}))
+def write_ulog(log: Log, path: Path, system: str = SYSTEM) -> None:
+    """Write a log as a ULog file, with its parameters and messages."""
+    strings = [logged(int(_us(np.array([row.t_s]))[0]), row.text) for row in log.happened if row.kind == MESSAGE]
+    path.write_bytes(assembled(topics_of(log), strings, {"sys_name": system}, log.parameters))
 
 
 def topics_of(log: Log) -> list[Topic]:
-    """The topics of a log's sensors, of its truth and of the estimate that the vehicle flew on."""
-    topics = [_inertial(log), _flow(log), _range(log), _gps(log)]
-    topics += [
-        _values("vehicle_air_data", log.streams[Sensor.BARO], "baro_alt_meter"),
-        _values("vehicle_magnetometer", log.streams[Sensor.MAG], "magnetometer_ga"),
-        _landed(log),
-    ]
+    """The topics of the sensors that a log has, of its truth and of the estimate that the vehicle flew on."""
+    topics = [write(log) for sensor, write in TOPICS.items() if sensor in log.streams]
     for table, suffix in ((log.autopilot, ""), (log.truth, "_groundtruth")):
         if table is not None:
             topics += _state(table, suffix)
+    fused = [(row.t_s, row.value) for row in log.happened if row.kind == FUSES_FLOW]
+    if fused:
+        t_s, value = np.array(fused).T
+        topics.append(Topic("estimator_status_flags", _us(t_s), [Field("bool", "cs_opt_flow", value)]))
     return topics
 
 
@@ -124,3 +126,14 @@ def _state(table: Table, suffix: str) -> list[Topic]:
         Topic(f"vehicle_local_position{suffix}", time_us, fields),
         Topic(f"vehicle_attitude{suffix}", time_us, [Field("float", "q", quaternion)]),
     ]
+
+
+TOPICS: dict[Sensor, Callable[[Log], Topic]] = {
+    Sensor.IMU: _inertial,
+    Sensor.FLOW_RATE: _flow,
+    Sensor.RANGE: _range,
+    Sensor.GPS_POSITION: _gps,
+    Sensor.BARO: lambda log: _values("vehicle_air_data", log.streams[Sensor.BARO], "baro_alt_meter"),
+    Sensor.MAG: lambda log: _values("vehicle_magnetometer", log.streams[Sensor.MAG], "magnetometer_ga"),
+    Sensor.LANDED: _landed,
+}

@@ -111,6 +111,7 @@ def _judged(flown: Flight) -> Judged:
 
 
 # -- a first look ------------------------------------------------------------------------------------------------
+OFF, APART_S, LATEST_S = 0.05, 0.03, 0.3  # of scale and time that velocities agree within; GPS may be so late
 AGREE, IN_PART = 0.9, 0.4  # correlation from which two velocities agree, or do so in part
 
 
@@ -131,6 +132,14 @@ class Look(NamedTuple):
     range_jumping: float
     own_attitude: bool
 
+    def differences(self) -> str:
+        """What keeps the two from being the same although they are alike, in words; "" where little does."""
+        more, ahead = self.scale - 1.0, self.lag_s
+        found = [f"the flow reads {100 * abs(more):.0f} % too {'much' if more > 0 else 'little'}"] * (abs(more) > OFF)
+        late = ahead < -APART_S or ahead > LATEST_S
+        found += [f"it lies {abs(ahead):.2f} s {'ahead of' if ahead > 0 else 'behind'} {self.against}"] * late
+        return " and ".join(found)
+
     @property
     def verdict(self) -> str:
         """In words."""
@@ -141,6 +150,8 @@ class Look(NamedTuple):
         if self.correlation < IN_PART:
             return f"flow and {self.against} do not agree: their velocities' correlation is {self.correlation:.2f}"
         agree = "agree" if self.correlation >= AGREE else f"agree in part (correlation {self.correlation:.2f})"
+        if differ := self.differences():
+            agree, figures = f"{agree} in shape, not in size and time", f"{differ} ({figures})"
         if self.right or not self.clear:
             return f"flow and {self.against} {agree}: {figures}"
         return f"flow and {self.against} disagree: {self.axes}; put right they {agree}: {figures}"

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import fftconvolve
 
 from flownav.core.frames import turned_level
 from flownav.core.measurement import Array
@@ -78,7 +77,8 @@ def smoothed(values: Array, width_s: float = SPLIT_S) -> Array:
     reach = int(4.0 * width_s / GRID_S)
     weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) * GRID_S / width_s) ** 2)
     padded = np.pad(values, ((reach, reach), (0, 0)), mode="edge")
-    return np.asarray(fftconvolve(padded, weights[:, None] / weights.sum(), "valid", axes=0))
+    weights /= weights.sum()
+    return np.column_stack([np.convolve(column, weights, "valid") for column in padded.T])
 
 
 def on_grid(t_s: Array, values: Array, grid: Array) -> Array:
@@ -157,14 +157,17 @@ def flow_likeness(flown: Flight, grid: Array, reference: Array, velocity: Array 
     t_s = flown.t_s[flown.good]
     seen = t_s - flown.age_s
     level, flow = flown.rotation(seen)[:, :2, :2], (flown.velocity_m_s if velocity is None else velocity)[flown.good]
+    lags = np.arange(*ALIKE_LAGS_S)
+    others = [on_grid(grid, reference[:, :2], seen + lag) @ np.array([1.0, 1j]) for lag in lags]
+    powers = [np.sum(np.abs(other) ** 2) for other in others]
     found = []
     for mirror in (1.0, -1.0):
         earth = np.einsum("nij,nj->ni", level, flow * np.array([1.0, mirror]))
         mean = mean_over(t_s, earth, t_s - ALIKE_S / 2, t_s + ALIKE_S / 2)
         signal = mean[:, 0] + 1j * mean[:, 1]
-        for lag in np.arange(*ALIKE_LAGS_S):
-            other = on_grid(grid, reference[:, :2], seen + lag) @ np.array([1.0, 1j])
-            size = float(np.sqrt(np.sum(np.abs(other) ** 2) * np.sum(np.abs(signal) ** 2)))
+        power = np.sum(np.abs(signal) ** 2)
+        for lag, other, other_power in zip(lags, others, powers, strict=True):
+            size = float(np.sqrt(other_power * power))
             found.append((mirror, complex(np.sum(np.conj(signal) * other)) / max(size, 1e-12), float(lag)))
     straight = max((one for one in found if one[0] > 0.0), key=lambda one: abs(one[1]))
     mirrored = max(abs(one[1]) for one in found if one[0] < 0.0)

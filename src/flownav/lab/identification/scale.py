@@ -25,7 +25,6 @@ one stretch of CLUSTER_S at a time (jackknife): one turn or one climb that is of
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import lfilter
 
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array
@@ -70,6 +69,8 @@ class _Track(NamedTuple):
 
 def _whitened(columns: Array, gain: float) -> Array:
     """Innovations of x[k+1] = x[k] + gain (z[k] - x[k]), column by column, started at the first row; (n - 1, k)."""
+    from scipy.signal import lfilter  # two seconds to load, and `flownav info` asks for nothing here
+
     return np.asarray(lfilter([1.0], [1.0, gain - 1.0], np.diff(columns, axis=0), axis=0))
 
 

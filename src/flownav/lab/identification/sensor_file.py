@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from flownav.core.errors import InputError
-from flownav.core.guard import written_whole
+from flownav.core.guard import write_text
 from flownav.core.parameter_files import check
 from flownav.core.provenance import hash_of
 from flownav.core.text import to_toml
@@ -65,8 +65,7 @@ def write_sensor(path: Path, entries: Mapping[str, Any]) -> FlowSensor:
 def write_whole(path: Path, text: str) -> None:
     """A text file under a temporary name, then renamed. InputError where it cannot be written."""
     try:
-        with written_whole(path) as temporary:
-            temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
+        write_text(text, path)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); give another name") from error
 

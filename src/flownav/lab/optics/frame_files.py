@@ -34,7 +34,7 @@ def read_frames(paths: Sequence[Path]) -> NDArray[np.uint8]:
 
 def read_grey(path: Path) -> NDArray[np.uint8]:
     """One picture as grey levels (height, width); colours by their luminance. InputError names the file."""
-    image_of, path = _pillow(), an_input(path)
+    image_of, path = pillow(), an_input(path)
     try:
         with image_of.open(path) as picture:
             mode = "I" if picture.mode.startswith("I") else "L"
@@ -60,11 +60,12 @@ def _stacked(files: list[Path]) -> NDArray[np.uint8]:
     return frames
 
 
-def _pillow() -> Any:
+def pillow() -> Any:
+    """Pillow's pictures. InputError where the package is not installed."""
     try:
         from PIL import Image
     except ImportError:
-        raise InputError("reading pictures needs Pillow: pip install pillow") from None
+        raise InputError("pictures need Pillow: pip install 'flownav[pictures]'") from None
     return Image
 
 
@@ -73,7 +74,7 @@ def _video(path: Path) -> NDArray[np.uint8]:
         av: Any = import_module("av")
     except ImportError:
         raise InputError(
-            f"{path}: reading video needs PyAV: pip install av; "
+            f"{path}: reading video needs PyAV: pip install 'flownav[video]'; "
             f"or extract the frames, ffmpeg -i {path.name} frames/%06d.png, and give the folder"
         ) from None
     try:
@@ -99,11 +100,10 @@ def signature() -> Any:
 
 def save_picture(frame: NDArray[np.uint8], path: Path) -> None:
     """Write a frame (height, width) as a PNG. InputError where it cannot be written."""
-    from PIL import Image
-
+    image = pillow()
     try:
         with written_whole(path) as temporary:
-            Image.fromarray(frame).save(temporary, format="PNG", pnginfo=signature())
+            image.fromarray(frame).save(temporary, format="PNG", pnginfo=signature())
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); give another folder") from error
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from flownav.core.errors import InputError
 from flownav.core.guard import written_whole
 from flownav.core.text import number
-from flownav.lab.optics.frame_files import signature
+from flownav.lab.optics.frame_files import pillow, signature
 
 BLACK, WHITE = 0.167, 0.833  # grey 30 and 150 where white paper would be 180
 STRIPE_GAP_M = 0.007  # the paper: "the best spacing between two black consecutive lines is 7 mm"
@@ -247,8 +247,7 @@ def ground(size: int, seed: int = 1) -> NDArray[np.float32]:
 
 def print_target(target: PadTarget, path: Path, dots_per_inch: int = 300) -> None:
     """Write the board as a picture that prints at its true size. InputError where it cannot be written."""
-    from PIL import Image
-
+    image = pillow()
     cells = printed_cells(target)
     cell_m = target.board_m / len(cells)
     dots = max(round(cell_m / 0.0254 * dots_per_inch), 1)
@@ -259,6 +258,6 @@ def print_target(target: PadTarget, path: Path, dots_per_inch: int = 300) -> Non
     try:
         with written_whole(path) as temporary:
             resolution = (printed_per_inch, printed_per_inch)
-            Image.fromarray(picture).save(temporary, format="PNG", dpi=resolution, pnginfo=signature())
+            image.fromarray(picture).save(temporary, format="PNG", dpi=resolution, pnginfo=signature())
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); give another place") from error

@@ -6,6 +6,7 @@ side as FOLDER/run-001, run-002, ...
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from flownav.core.errors import InputError
 from flownav.core.guard import an_output, an_output_folder, written_whole
+from flownav.core.marks import marked
 from flownav.core.measurement import Array
 from flownav.core.provenance import provenance
 from flownav.core.text import to_toml
@@ -207,9 +209,10 @@ def write_rig_folder(log: RigLog, folder: Path, command: str = "", *, dated: boo
     check_rig_folder(folder)
     try:
         with ExitStack() as both:
-            for name, content in (("rig.csv", text), ("rig.toml", _set_up(log, command, dated=dated))):
-                temporary = both.enter_context(written_whole(folder / name, replacing=True))
-                temporary.write_text(content, encoding="utf-8", errors="backslashreplace")
+            rows = text.encode()
+            set_up = marked(_set_up(log, command, hashlib.sha256(rows).hexdigest(), dated=dated))
+            for name, content in (("rig.csv", rows), ("rig.toml", set_up)):
+                both.enter_context(written_whole(folder / name, replacing=True)).write_bytes(content)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror}); give another name") from error
 
@@ -223,7 +226,8 @@ def run_folders(folder: Path, count: int) -> Iterator[Path]:
         yield folder / f"run-{number:03d}"
 
 
-def _set_up(log: RigLog, command: str, *, dated: bool) -> str:
+def _set_up(log: RigLog, command: str, digest: str, *, dated: bool) -> str:
+    """rig.toml as text; digest: SHA-256 of rig.csv."""
     s, made = log.settings, provenance()
     entries: dict[str, Any] = {"schema_version": SCHEMA_VERSION, "pivot_height_m": log.rod_length_m + s.height_m}
     entries |= {"rod_length_m": log.rod_length_m, "height_m": s.height_m}
@@ -233,7 +237,7 @@ def _set_up(log: RigLog, command: str, *, dated: bool) -> str:
     origin |= {"light": s.light, "axis_along_swing": s.along}
     told = ("start_angle_rad", "duration_s", "refocus", "gyro_late_s", "sonar_late_s")
     origin |= {name: getattr(s, name) for name in told} | {"flownav": made["flownav"]}
-    origin |= {"written_utc": made["written_utc"]} if dated else {}
+    origin |= {"rig_csv_sha256": digest} | ({"written_utc": made["written_utc"]} if dated else {})
     return to_toml(_rounded(entries) | {"provenance": _rounded(origin)})
 
 

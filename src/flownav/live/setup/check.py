@@ -5,6 +5,7 @@ from typing import Any
 
 from flownav.live.link import Address
 from flownav.live.reception import Vehicle
+from flownav.live.setup.arming import RECEIVERS, Place, Readiness, has_no_gps, readiness
 from flownav.live.setup.compare import Block, Row, blocks_of, port_names, port_of, rows_of, source_set
 from flownav.live.setup.knowledge import Knowledge, knowledge_of
 from flownav.live.setup.talk import Change, Talk, read, why_not, write
@@ -30,6 +31,7 @@ class Report:
     port: str = ""
     changes: list[Change] = field(default_factory=list)
     refused: list[str] = field(default_factory=list)
+    ready: Readiness = field(default_factory=Readiness)
     notes: list[str] = field(default_factory=list)
     in_flight: list[str] = field(default_factory=list)
 
@@ -48,6 +50,10 @@ class Report:
             "serial_port": self.port or None,
             "changes": [{**change._asdict(), "done": change.done} for change in self.changes],
             "refused": self.refused,
+            "without_gps": self.ready.without_gps,
+            "origin_lat_lon_deg_alt_m": self.ready.origin_deg_m,
+            "missing": self.ready.missing,
+            "autopilot_says": self.ready.says,
             "notes": self.notes,
             "in_flight": self.in_flight,
         }
@@ -60,9 +66,10 @@ def check(
     *,
     writing: bool = False,
     asked_set: int | None = None,
+    origin: Place | None = None,
     meet_s: float = MEET_S,
 ) -> Report:
-    """The whole of `--setup` over a conversation. Nothing is written unless `writing`."""
+    """The whole of `--setup` over a conversation. Nothing is written unless `writing`, but an origin that is given."""
     vehicle = talk.meet(meet_s)
     if vehicle is None:
         return Report(_nobody(talk, meet_s), send=send)
@@ -73,7 +80,8 @@ def check(
             vehicle=vehicle, armed=talk.armed, send=send,
         )  # fmt: skip
     uart = address.over_uart
-    values = read(talk, known.names(send) + (port_names(known.serial_parameters) if uart else []))
+    receivers = list(RECEIVERS.get(known.name.lower(), ()))
+    values = read(talk, known.names(send) + receivers + (port_names(known.serial_parameters) if uart else []))
     if not values:
         return Report(
             f"the {known.name} vehicle is heard but answers no request for a parameter: a router or a signing key "
@@ -92,13 +100,19 @@ def check(
                 0, f"Reboot the vehicle, then run this again: {', '.join(rebooting)} count from then on."
             )
             report.verdict += "; the vehicle must be rebooted"
+    if send in ("odometry", "vision"):
+        report.ready = readiness(talk, known.name.lower(), values, origin)
+        if report.ready.missing:
+            report.fits = False
+            report.verdict += "; it cannot arm yet"
     return report
 
 
 def _compared(
     known: Knowledge, values: dict[str, Value], send: str, asked_set: int | None, uart: Address | None
 ) -> Report:
-    chosen = source_set(known, values, asked_set)
+    without = has_no_gps(known.name.lower(), values)
+    chosen = source_set(known, values, asked_set or (1 if without and known.first_source_set else None))
     by_estimate = send in ("odometry", "vision")
     wanted = known.wanted(send, chosen)
     port = ""
@@ -118,11 +132,12 @@ def _compared(
         if fits
         else f"{len(wrong)} of {len(rows)} parameters must change" + ("; arming is blocked" if blocks else "")
     )
-    in_flight = known.in_flight if by_estimate else ()
+    in_flight = known.in_flight if by_estimate and not without else ()
+    other = 2 if chosen == 1 else 1  # of GPS
     return Report(
         verdict, fits, known.name, send=send, source_set=chosen if by_estimate else 0, rows=rows, blocks=blocks,
         port=port, notes=notes,
-        in_flight=[line.replace("{n}", str(chosen)) for line in in_flight],
+        in_flight=[line.replace("{n}", str(chosen)).replace("{g}", str(other)) for line in in_flight],
     )  # fmt: skip
 
 

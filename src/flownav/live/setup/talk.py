@@ -15,6 +15,7 @@ from flownav.logs.mavlink.outgoing import ODOMETRY_COMPONENT, companion_heartbea
 from flownav.logs.mavlink.signing import sign_outgoing
 
 ARMED_FLAG = 128  # MAV_MODE_FLAG_SAFETY_ARMED
+BETTER_S = 2.5  # for an autopilot beside a gimbal that says it is one: chosen, two HEARTBEATs
 FRESH_S = 3.0  # an older HEARTBEAT does not say whether the vehicle is armed: chosen, three of them
 WAIT_S = 0.02  # chosen
 HEARTBEAT_S = 1.0
@@ -82,10 +83,16 @@ class Talk:
         return messages
 
     def meet(self, limit_s: float) -> Vehicle | None:
-        """Wait for an autopilot's HEARTBEAT; None where none came."""
+        """Wait for an autopilot's HEARTBEAT; None where none came. One of an unknown make may give way to a better."""
         end_s = self.clock() + limit_s
         while self.vehicle is None and self.clock() < end_s:
             self.hear()
+        end_s = self.clock() + BETTER_S
+        while self.vehicle is not None and not self.reception.known and self.clock() < end_s:
+            self.hear()
+            better = self.reception.better(self.clock())
+            if better is not None:
+                self.reception.take(better)
         return self.vehicle
 
 

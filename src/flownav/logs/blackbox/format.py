@@ -53,8 +53,10 @@ class Header:
 
     @property
     def firmware(self) -> str:
-        """Such as "INAV 7.1.0" or "Betaflight 4.5.1"."""
-        return " ".join(self.settings.get("Firmware revision", "").split()[:2]) or "an unknown firmware"
+        """Such as "INAV 7.1.0" or "Betaflight 4.5.1"; "Cleanflight d72983e", whose revision is a commit alone."""
+        words = self.settings.get("Firmware revision", "").split()[:2]
+        kind = self.settings.get("Firmware type", "").split()[:1] if len(words) == 1 else []
+        return " ".join([*kind, *words]) or "an unknown firmware"
 
     @property
     def is_inav(self) -> bool:

@@ -14,13 +14,12 @@ Betaflight writes of its flow sensor (debug OPTICALFLOW) changes its meaning bet
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.core.errors import InputError, arg
 from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import Table
-from flownav.logs.assembly import MOST_BYTES, Origin, content_of, gps_streams, sensor_stream, sha256_of
+from flownav.logs.assembly import Origin, content_of, fresh_rows, gps_streams, sensor_stream, sha256_of
 from flownav.logs.blackbox.format import Header, headers
 from flownav.logs.blackbox.frames import Frames, read_frames
 from flownav.logs.log import Log, absences_of, frd, ned_from_frd_of_nwu, state_table
@@ -32,11 +31,11 @@ QUATERNION_UNIT = 32767.0  # Betaflight's imuQuaternion: 0x7FFF is 1
 HIGH_RESOLUTION = 10.0
 LEAST_SATELLITES = 5
 FIX_3D = 2  # INAV's gpsFixType_e
-SLOW_S, HELD_S = 0.01, 0.1  # a slow sensor's value stands in every frame: again only if it changed, or after this long
 LEAST_ROWS = 2
 FIELDS = frozenset(
-    f"{name}[{k}]" for name, count in (("gyroADC", 3), ("accSmooth", 3), ("attitude", 3), ("imuQuaternion", 3),
-                                       ("navPos", 3), ("navVel", 3), ("debug", 4)) for k in range(count)
+    f"{name}[{k}]" for name, count in (("gyroADC", 3), ("gyroData", 3), ("accSmooth", 3), ("attitude", 3),
+                                       ("imuQuaternion", 3), ("navPos", 3), ("navVel", 3), ("debug", 4))
+    for k in range(count)
 ) | {"time", "BaroAlt", "baroAlt", "surfaceRaw"}  # fmt: skip
 
 LACKING = {
@@ -59,7 +58,7 @@ def read_blackbox(path: Path, *, flow_instance: int | None = None) -> Log:
         raise InputError(
             f"{arg('flow_instance')}: {path} is a blackbox log, with one flow sensor at most; leave it out"
         )
-    content = content_of(path, "a blackbox log", MOST_BYTES)
+    content = content_of(path, "a blackbox log")
     found = headers(content)
     if not found:
         raise InputError(f"{path}: no blackbox log whose header defines its fields; give another log")
@@ -105,26 +104,17 @@ def _matrix(frames: Frames, name: str, count: int) -> Array | None:
     return np.column_stack([frames.main[each] for each in names]).astype(float)
 
 
-def _fresh(t_s: Array, value: Array) -> NDArray[np.bool_]:
-    """Rows that say something new: a changed value, or the same after HELD_S; SLOW_S apart at the least."""
-    changed = np.append(True, (np.diff(value, axis=0) != 0).any(axis=1))
-    keep = np.zeros(len(t_s), bool)
-    taken = -np.inf
-    pending = False
-    for row, t in enumerate(t_s.tolist()):
-        pending = pending or bool(changed[row])
-        if t < taken or (pending and t - taken >= SLOW_S) or t - taken >= HELD_S:
-            keep[row], taken, pending = True, t, False
-    return keep
-
-
 def _imu(header: Header, frames: Frames, t_s: Array) -> Stream | None:
-    """gyroADC [deg/s by gyro_scale; a tenth with blackbox_high_resolution] and accSmooth [acc_1G counts a G], FLU."""
+    """gyroADC [deg/s by gyro_scale; a tenth with blackbox_high_resolution] and accSmooth [acc_1G counts a G], FLU.
+
+    Cleanflight of 2015 called them gyroData and gyro.scale.
+    """
     gyro, force = _matrix(frames, "gyroADC", 3), _matrix(frames, "accSmooth", 3)
+    gyro = _matrix(frames, "gyroData", 3) if gyro is None else gyro
     one_g = header.number("acc_1G", 0.0)
     if gyro is None or force is None or not 16.0 <= one_g <= 65536.0:
         return None
-    scale = header.number("gyro_scale", 1.0)
+    scale = header.number("gyro_scale", header.number("gyro.scale", 1.0))
     scale = scale if 1e-4 < scale < 1e4 else 1.0
     if header.number("blackbox_high_resolution", 0.0) == 1.0:
         scale /= HIGH_RESOLUTION
@@ -136,13 +126,13 @@ def _attitude(frames: Frames, t_s: Array) -> Stream | None:
     """INAV's angles [0.1 deg], or the vector part of Betaflight's quaternion, whose scalar part is not negative."""
     angles = _matrix(frames, "attitude", 3)
     if angles is not None:
-        rows = _fresh(t_s, angles)
+        rows = fresh_rows(t_s, angles)
         roll, pitch, yaw = np.radians(DECIDEGREE * angles[rows]).T
         return sensor_stream(Sensor.ATTITUDE, t_s[rows], np.column_stack(quaternion_from_euler(roll, -pitch, yaw)))
     vector = _matrix(frames, "imuQuaternion", 3)
     if vector is None:
         return None
-    rows = _fresh(t_s, vector)
+    rows = fresh_rows(t_s, vector)
     xyz = vector[rows] / QUATERNION_UNIT
     w = np.sqrt(np.maximum(1.0 - np.sum(xyz * xyz, axis=1), 0.0))
     return sensor_stream(Sensor.ATTITUDE, t_s[rows], ned_from_frd_of_nwu(np.column_stack([w, xyz])))
@@ -163,7 +153,7 @@ def _range(frames: Frames, t_s: Array) -> Stream | None:
     if "surfaceRaw" not in frames.main:
         return None
     range_m = CM * frames.main["surfaceRaw"].astype(float)
-    rows = _fresh(t_s, range_m[:, None]) & (range_m > 0.0)
+    rows = fresh_rows(t_s, range_m[:, None]) & (range_m > 0.0)
     return sensor_stream(Sensor.RANGE, t_s[rows], range_m[rows])
 
 
@@ -173,7 +163,7 @@ def _baro(frames: Frames, t_s: Array) -> Stream | None:
     if not name:
         return None
     height = CM * frames.main[name].astype(float)
-    rows = _fresh(t_s, height[:, None])
+    rows = fresh_rows(t_s, height[:, None])
     return sensor_stream(Sensor.BARO, t_s[rows], height[rows])
 
 
@@ -207,7 +197,7 @@ def _estimate(frames: Frames, t_s: Array, attitude: Stream | None) -> Table | No
     place, speed = _matrix(frames, "navPos", 3), _matrix(frames, "navVel", 3)
     if place is None or speed is None:
         return None
-    rows = np.flatnonzero(_fresh(t_s, np.column_stack([place, speed])))
+    rows = np.flatnonzero(fresh_rows(t_s, np.column_stack([place, speed])))
     rows = rows[np.append(True, np.diff(t_s[rows]) > 0)] if len(rows) else rows
     rows = rows[np.concatenate([[True], t_s[rows][1:] >= np.maximum.accumulate(t_s[rows])[:-1]])] if len(rows) else rows
     if len(rows) < LEAST_ROWS or not place[rows].any():

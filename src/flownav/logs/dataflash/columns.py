@@ -13,10 +13,10 @@ from flownav.core.guard import an_input
 from flownav.core.measurement import Array
 from flownav.logs.csv_table import Column, CsvTable, check_clock, check_finite
 from flownav.logs.dataflash import formats
+from flownav.logs.dataflash.text_form import LOOKED_AT_BYTES, binary_of, is_text
 
 Columns = dict[str, NDArray[Any]]
 DESCRIBING: tuple[str, ...] = ("UNIT", "MULT", "FMTU")
-MICROSECOND_S = 1e-6
 
 
 class DataFlash:
@@ -73,22 +73,22 @@ class DataFlash:
 
         Numbers are as ArduPilot's own tools give them: the factors of the characters c, C, e, E and L are applied
         (float64), those of MULT are not (`Format.multipliers`). Text is bytes, see `text`. instance: only one
-        sensor's. t0_s, t1_s: only t0 <= TimeUS * 1e-6 < t1, seconds since the vehicle started.
-        KeyError where the kind, a label, TimeUS or the instance field is unknown.
+        sensor's. t0_s, t1_s: only t0 <= time < t1, seconds since the vehicle started.
+        KeyError where the kind, a label, its time or the instance field is unknown.
         """
         known = self.formats[name]
         wanted = known.labels if labels is None else tuple(labels)
         sliced = t0_s is not None or t1_s is not None
-        unknown = {*wanted, *(("TimeUS",) if sliced else ())} - set(known.labels)
-        if unknown or (sliced and "TimeUS" not in known.numbers):
-            raise KeyError(f"{name} has no {', '.join(sorted(unknown or {'TimeUS in numbers'}))}")
+        unknown = {*wanted} - set(known.labels) | ({"time"} if sliced and known.clock is None else set())
+        if unknown:
+            raise KeyError(f"{name} has no {', '.join(sorted(unknown))}")
         at = self._offsets(known)
         if instance is not None:
             if known.instance is None:
                 raise KeyError(f"{name} has no instance field")
             at = at[self._field(known, known.instance, at) == instance]
         if sliced:
-            t_s = self._field(known, "TimeUS", at) * 1e-6
+            t_s = self._times(known, at)
             at = at[(t_s >= (-np.inf if t0_s is None else t0_s)) & (t_s < (np.inf if t1_s is None else t1_s))]
         rows = formats.records(self._content, known.dtype)[at]
         return {label: _converted(rows[label], known.code(label)) for label in wanted}
@@ -100,6 +100,31 @@ class DataFlash:
             return []
         found = np.unique(self._field(known, known.instance, self._offsets(known)))
         return [int(value) for value in found] if found.dtype.kind in "iu" else []
+
+    def times(self, name: str, *, instance: int | None = None) -> Array:
+        """When each message of a kind was written [s], seconds since the vehicle started; NaN where nothing says.
+
+        Of a kind without a time of its own, what the messages before it said.
+        """
+        known = self.formats[name]
+        at = self._offsets(known)
+        if instance is not None and known.instance is not None:
+            at = at[self._field(known, known.instance, at) == instance]
+        return self._times(known, at) if known.clock else self._times_before(at)
+
+    def _times(self, known: formats.Format, at: formats.Indices) -> Array:
+        assert known.clock is not None
+        label, unit_s = known.clock
+        return _scaled(self._field(known, label, at), unit_s)
+
+    def _times_before(self, at: formats.Indices) -> Array:
+        """The time of the last message before each offset, of the kind that is written most often."""
+        timed = [known for known in self.formats.values() if known.clock and self._counts[known.type]]
+        if not timed:
+            return np.full(len(at), np.nan)
+        clock = max(timed, key=lambda known: int(self._counts[known.type]))
+        beside = self._offsets(clock)
+        return np.asarray(self._times(clock, beside)[np.maximum(np.searchsorted(beside, at) - 1, 0)])
 
     def _offsets(self, known: formats.Format) -> formats.Indices:
         return np.asarray(self._scan.offset[self._scan.type == known.type])
@@ -118,14 +143,14 @@ def read_columns(
 ) -> dict[str, Columns]:
     """The tables of some kinds of message (all that occur where None); kinds that do not occur are left out.
 
-    A time slice leaves out the kinds that carry no TimeUS. InputError where the file is no DataFlash log.
+    A time slice leaves out the kinds that carry no time. InputError where the file is no DataFlash log.
     """
     log = DataFlash(path)
     sliced = t0_s is not None or t1_s is not None
     return {
         name: log.table(name, t0_s=t0_s, t1_s=t1_s)
         for name in log.names()
-        if (messages is None or name in messages) and not (sliced and "TimeUS" not in log.formats[name].numbers)
+        if (messages is None or name in messages) and not (sliced and log.formats[name].clock is None)
     }
 
 
@@ -156,7 +181,9 @@ def _converted(values: NDArray[Any], code: str) -> NDArray[Any]:
 def _content(path: Path) -> formats.Bytes:
     try:
         with an_input(path).open("rb") as file:
-            return np.frombuffer(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ), np.uint8)
+            content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        as_text = is_text(content[:LOOKED_AT_BYTES])
+        return np.frombuffer(binary_of(content[:]) if as_text else content, np.uint8)
     except ValueError:
         raise InputError(f"{path}: the file is empty; a .bin log as the vehicle wrote it is needed") from None
     except OSError as error:
@@ -165,7 +192,10 @@ def _content(path: Path) -> formats.Bytes:
 
 # -- checked rows -------------------------------------------------------------------------------------------
 class Field(NamedTuple):
-    """A field of a message: the limits of its values and the factor to their unit where the log states none."""
+    """A field of a message: the limits of its values and the factor to their unit where the log states none.
+
+    older: its name in the logs of years before.
+    """
 
     label: str
     low: float
@@ -173,22 +203,47 @@ class Field(NamedTuple):
     factor: float = 1.0
     required: bool = True
     may_be_nan: bool = False
+    older: str = ""
+
+    def named(self, labels: Collection[str]) -> str:
+        """Its name among a message's labels."""
+        return self.older if self.older in labels and self.label not in labels else self.label
 
 
-def message_rows(log: DataFlash, name: str, fields: Sequence[Field], instance: int | None = None) -> CsvTable | None:
+def message_rows(
+    log: DataFlash, name: str, fields: Sequence[Field], instance: int | None = None, *, timeless: bool = False
+) -> CsvTable | None:
     """Every row of a kind of message as written, t_s seconds since the vehicle started.
 
-    None where the kind does not occur, or lacks TimeUS or a required field as a number.
+    None where the kind does not occur, lacks a required field as a number, or, unless `timeless`, a time of its own.
     """
-    numeric = log.formats[name].numbers if log.count(name) else frozenset()
-    lacking = [field.label for field in fields if field.required and field.label not in numeric]
-    if "TimeUS" not in numeric or lacking:
+    if not log.count(name) or (lacking(log, name, fields) if not timeless else _unfilled(log, name, fields)):
         return None
-    present = [field for field in fields if field.label in numeric]
-    columns = log.table(name, ["TimeUS", *(field.label for field in present)], instance=instance)
-    stated = log.formats[name].multipliers
-    scaled = {field.label: _scaled(columns[field.label], stated.get(field.label, field.factor)) for field in present}
-    return CsvTable(_scaled(columns["TimeUS"], MICROSECOND_S), scaled, path=Path(f"{log.path}: {name}"))
+    known = log.formats[name]
+    present = {
+        field.label: field.named(known.numbers) for field in fields if field.named(known.numbers) in known.numbers
+    }
+    columns = log.table(name, dict.fromkeys(present.values()), instance=instance)
+    factor = {field.label: known.multipliers.get(field.named(known.numbers), field.factor) for field in fields}
+    scaled = {label: _scaled(columns[there], factor[label]) for label, there in present.items()}
+    return CsvTable(log.times(name, instance=instance), scaled, path=Path(f"{log.path}: {name}"))
+
+
+def lacking(log: DataFlash, name: str, fields: Sequence[Field]) -> str:
+    """What a kind of message that occurs lacks to be read, in words; "" where it lacks nothing."""
+    unfilled = _unfilled(log, name, fields)
+    if unfilled:
+        return f"a field that is needed ({', '.join(field.label for field in fields if field.required)})"
+    return (
+        ""
+        if log.formats[name].clock
+        else "a time (TimeUS or TimeMS): ArduPilot before 3.2 wrote none, give a later log"
+    )
+
+
+def _unfilled(log: DataFlash, name: str, fields: Sequence[Field]) -> list[str]:
+    numbers = log.formats[name].numbers
+    return [field.label for field in fields if field.required and field.named(numbers) not in numbers]
 
 
 def _scaled(values: NDArray[Any], factor: float) -> Array:

@@ -11,17 +11,18 @@ from flownav.core.errors import InputError
 from flownav.core.frames import quaternion_from_euler
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.provenance import hash_of
-from flownav.core.record import Table
+from flownav.core.record import POSITION_NED, Table
 from flownav.logs.assembly import Origin, local_ned
 from flownav.logs.csv_table import CsvTable
 from flownav.logs.dataflash import sensors
-from flownav.logs.dataflash.columns import DataFlash, Field, check_rows, good_rows, held_at, message_rows, text
+from flownav.logs.dataflash.columns import DataFlash, Field, check_rows, good_rows, held_at, message_rows
+from flownav.logs.dataflash.said import battery, happened, parameters, setpoints
 from flownav.logs.log import SIMULATOR, Log, absences_of, state_table
 from flownav.logs.plausible import check_plausible
 
 FARTHEST_M, FASTEST_M_S = 1e5, 300.0
 EKF_ORIGIN = 0  # ORGN's Type: the filter's origin; 1 is home
-FILTERS = {3: ("EKF3", "XKF"), 2: ("EKF2", "NKF")}  # by AHRS_EKF_TYPE
+FILTERS = {3: ("EKF3", "XKF"), 2: ("EKF2", "NKF"), 1: ("EKF1", "EKF")}  # by AHRS_EKF_TYPE; the last before 2016
 
 GEODETIC = (Field("Lat", -90, 90), Field("Lng", -180, 180), Field("Alt", -1000, 20000))
 POSITION_VELOCITY = (
@@ -35,17 +36,6 @@ ESTIMATE = (
 )
 TRUE_STATE = (*GEODETIC, *(Field(f"Q{i}", -1.01, 1.01) for i in (1, 2, 3, 4)))
 LONGEST_DELAY_S = 1.0
-
-
-def parameters(log: DataFlash) -> dict[str, float]:
-    """The vehicle's parameters by name, as last written."""
-    known = log.formats.get("PARM")
-    if known is None or not {"Name", "Value"} <= set(known.labels) or known.code("Name") not in "nNZ":
-        return {}
-    if known.code("Value") in "anNZ":
-        return {}
-    table = log.table("PARM", ["Name", "Value"])
-    return dict(zip(text(table["Name"]), map(float, table["Value"]), strict=True))
 
 
 def filter_origins(log: DataFlash) -> CsvTable | None:
@@ -79,13 +69,27 @@ def _primary(log: DataFlash, name: str, table: CsvTable) -> Array:
 
 def estimate(table: CsvTable, origins: CsvTable | None, origin: Origin | None) -> Table:
     """The estimate about the log's origin; about the filter's own where either is unknown."""
-    position = table.matrix("PN", "PE", "PD")
-    if origins is not None and origin is not None:
-        shift = local_ned(origins.matrix("Lat", "Lng", "Alt"), origin)
-        position = position + held_at(table.t_s, origins.t_s, shift)
+    position = about_origin(table.t_s, table.matrix("PN", "PE", "PD"), origins, origin)
     angles = np.radians(table.matrix("Roll", "Pitch", "Yaw"))
     quaternion = np.column_stack(quaternion_from_euler(*angles.T))
     return state_table(table.t_s, position, table.matrix("VN", "VE", "VD"), quaternion)
+
+
+def about_origin(t_s: Array, position: Array, origins: CsvTable | None, origin: Origin | None) -> Array:
+    """Positions (n, 3) of the filter's frame about the log's origin; as they are where either origin is unknown."""
+    if origins is None or origin is None:
+        return position
+    shift = local_ned(origins.matrix("Lat", "Lng", "Alt"), origin)
+    return np.asarray(position + held_at(t_s, origins.t_s, shift))
+
+
+def asked_about(table: Table, origins: CsvTable | None, origin: Origin | None) -> Table:
+    """A set-point's table, a position of it moved likewise."""
+    if POSITION_NED[0] not in table:
+        return table
+    place = np.column_stack([table[name] for name in POSITION_NED])
+    moved = about_origin(table["t_s"], place, origins, origin)
+    return table | dict(zip(POSITION_NED, moved.T, strict=True))
 
 
 def true_rows(log: DataFlash) -> tuple[CsvTable, CsvTable | None] | None:
@@ -126,6 +130,7 @@ def stated_limits(settings: dict[str, float], rangefinder: int) -> dict[str, tup
 
 
 # -- the log ------------------------------------------------------------------------------------------------
+@np.errstate(all="ignore")  # a flipped bit makes numbers that overflow; the limits leave them out
 def read_dataflash(path: Path, *, flow_instance: int | None = None) -> Log:
     """Read a log; times are seconds since the first reading used.
 
@@ -137,7 +142,7 @@ def read_dataflash(path: Path, *, flow_instance: int | None = None) -> Log:
     notes = _file_notes(log)
     settings = parameters(log)
     tables = sensors.sensor_rows(log, flow_instance, notes)
-    _check_needed(log, tables)
+    _check_needed(log, tables, notes)
     estimated, simulated = estimate_rows(log, settings), true_rows(log)
     origins = filter_origins(log)
     beside = [*(estimated[1:] if estimated else ()), *(simulated or ()), origins]
@@ -149,7 +154,7 @@ def read_dataflash(path: Path, *, flow_instance: int | None = None) -> Log:
     origin = _first(tables.get("GPS"))
     about = origin or _first(origins) or _first(simulated[0] if simulated else None)
     streams = _streams(tables, origin, settings)
-    check_plausible(path, streams)
+    check_plausible(path, streams, flow=False)
     if estimated and origins is None:
         notes.append("ORGN is absent: the autopilot's estimate stands about its own origin")
     return Log(
@@ -159,6 +164,9 @@ def read_dataflash(path: Path, *, flow_instance: int | None = None) -> Log:
         stated_limits(settings, sensors.rangefinder_instance(log)) if "RFND" in tables else {},
         tuple(absences_of(streams, flow_rate="no optical flow (OF)", range="no downward rangefinder (RFND)")),
         clock_start_s=float(start_s), truth_name=SIMULATOR,
+        parameters={name: value for name, value in settings.items() if np.isfinite(value)},
+        happened=happened(log, start_s), battery=battery(log, start_s),
+        setpoints=tuple(asked_about(each, origins, about) for each in setpoints(log, start_s)),
     )  # fmt: skip
 
 
@@ -174,10 +182,14 @@ def _file_notes(log: DataFlash) -> list[str]:
     return notes
 
 
-def _check_needed(log: DataFlash, tables: dict[str, CsvTable]) -> None:
-    if not tables.keys() & {"GPS", *sensors.STREAMS}:
-        wanted = ", ".join(["GPS", *sensors.STREAMS])
-        raise InputError(f"{log.path}: no usable {wanted} in the log; LOG_BITMASK decides what the vehicle writes")
+def _check_needed(log: DataFlash, tables: dict[str, CsvTable], notes: list[str]) -> None:
+    """InputError where no sensor's message can be read; notes: why those that occur cannot."""
+    wanted = ["GPS", *sensors.STREAMS]
+    if tables.keys() & set(wanted):
+        return
+    told = [note for note in notes if note.partition(" ")[0].rstrip(":") in wanted]
+    why = "; ".join(told) or "LOG_BITMASK decides what the vehicle writes"
+    raise InputError(f"{log.path}: no usable {', '.join(wanted)} in the log; {why}")
 
 
 def _check_overlap(path: Path, tables: dict[str, CsvTable]) -> None:

@@ -30,6 +30,10 @@ FMT_TYPE = 0x80
 NO_UNIT, NO_MULTIPLIER = "", 0.0
 INSTANCE_UNIT = "#"
 INSTANCE_LABELS = ("I", "C", "Instance")  # of logs older than FMTU
+# the field that is the vehicle's clock, and its unit [s]: TimeMS before May 2015; a GPS had its own time of the week in
+# that, and the vehicle's in T
+CLOCKS = (("TimeUS", 1e-6), ("TimeMS", 1e-3))
+GPS_CLOCKS = (("TimeUS", 1e-6), ("T", 1e-3))
 
 _SIZES = np.full(256, -1000)
 _SIZES[0] = 0
@@ -177,6 +181,12 @@ class Format:
     def numbers(self) -> frozenset[str]:
         """Labels of the fields that are one number each."""
         return frozenset(label for label, c in zip(self.labels, self.codes, strict=True) if c not in NOT_NUMBERS)
+
+    @property
+    def clock(self) -> tuple[str, float] | None:
+        """The field that says when, and its unit [s]; None of a message that does not say."""
+        clocks = GPS_CLOCKS if self.name.startswith("GPS") else CLOCKS
+        return next(((label, unit_s) for label, unit_s in clocks if label in self.numbers), None)
 
     def code(self, label: str) -> str:
         """A field's format character."""

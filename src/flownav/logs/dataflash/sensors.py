@@ -16,7 +16,7 @@ from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion,
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.logs.assembly import Origin, local_ned, near_the_rest
 from flownav.logs.csv_table import CsvTable
-from flownav.logs.dataflash.columns import DataFlash, Field, check_rows, message_rows
+from flownav.logs.dataflash.columns import DataFlash, Field, check_rows, lacking, message_rows
 from flownav.logs.log import attitude_at
 
 GYRO_LIMIT_RAD_S = 70.0  # twice the range of a 2000 deg/s gyro
@@ -24,6 +24,7 @@ RANGE_GOOD, FACING_DOWN = 4, 25  # RangeFinder::Status::Good, ROTATION_PITCH_270
 LEAST_FIX = 3  # GPS_OK_FIX_3D
 LANDED_BY_EVENT = {11: 1.0, 18: 1.0, 28: 0.0}  # disarmed, land complete, not landed (AP_Logger's LogEvent)
 GAUSS_PER_MILLIGAUSS = 1e-3
+TIMELESS = ("EV",)  # without a time before 2015: that of the message before is near enough
 
 # of several sensors the one with the most rows of this kind: a GPS in use, flow with data, range downward
 PREFERRED: dict[str, tuple[str, Callable[[NDArray[Any]], NDArray[np.bool_]]]] = {
@@ -54,8 +55,8 @@ FIELDS: dict[str, tuple[Field, ...]] = {
         *(Field(f"body{axis}", -GYRO_LIMIT_RAD_S, GYRO_LIMIT_RAD_S, may_be_nan=True) for axis in "XY"),
     ),
     "RFND": (
-        Field("Dist", -1, 1000),
-        *(Field(label, 0, 255, required=False) for label in ("Stat", "Orient")),
+        Field("Dist", -1, 1000, older="Dist1"),
+        *(Field(label, 0, 255, required=False, older=older) for label, older in (("Stat", ""), ("Orient", "Orient1"))),
     ),
     "BARO": (Field("Alt", -1000, 20000), Field("Health", 0, 255, required=False)),
     "MAG": (
@@ -75,12 +76,10 @@ def sensor_rows(log: DataFlash, flow_instance: int | None, notes: list[str]) -> 
     tables = {}
     for name, fields in FIELDS.items():
         instance = _chosen(log, name, flow_instance)
-        table = message_rows(log, name, fields, instance)
+        table = message_rows(log, name, fields, instance, timeless=name in TIMELESS)
         if table is None:
             if log.count(name):
-                notes.append(
-                    f"{name} lacks a field that is needed ({', '.join(f.label for f in fields if f.required)})"
-                )
+                notes.append(f"{name} lacks {lacking(log, name, fields)}")
             continue
         others = [other for other in log.instances(name) if other != instance]
         if others:

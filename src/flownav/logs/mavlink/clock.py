@@ -26,6 +26,7 @@ CONFIRMATIONS = 3
 LONGEST_WAIT_S = 1.0  # an unstamped message follows its stamped predecessor by no more than this
 LONGEST_PAUSE_S = 86400.0  # arrivals further apart than this are a damaged arrival time
 CRYSTAL_DRIFT = 200e-6  # of one crystal against another
+SET_BACK_S, SET_FOR_S = 0.25, 1.0  # of another clock: all its stamps later by more, for so long, say that it was set
 
 ClockName = tuple[int, int, str]  # system, component, "boot" or "unix"
 
@@ -39,7 +40,9 @@ class Stamp(NamedTuple):
 
 
 class _Clock(NamedTuple):
-    """log time = stamp + offset. stamp_s: newest, unwrapped. doubted_*: a step that is not yet believed."""
+    """log time = stamp + offset. stamp_s: newest, unwrapped. doubted_*: a step that is not yet believed. late_*: since
+    when all stamps came later than the least wait by SET_BACK_S or more, and by how much at least.
+    """
 
     offset_s: float
     stamp_s: float
@@ -47,6 +50,8 @@ class _Clock(NamedTuple):
     doubted_offset_s: float = 0.0
     doubted_stamp_s: float = 0.0
     doubts: int = 0
+    late_since_s: float = float("nan")
+    late_s: float = 0.0
 
 
 class ClockState(NamedTuple):
@@ -94,14 +99,26 @@ def align(state: ClockState, arrival_s: float, stamp: Stamp | None) -> tuple[Clo
     event = "wrapped" if turns > 0 else ""
     if not _believable(state, clock, reading, arrival_s, rules):
         return _doubted(state, clock, stamp, arrival_s, rules)
-    offset = clock.offset_s
+    laid = _Clock(clock.offset_s, max(reading, clock.stamp_s), wraps)
     if not rules:
-        advance = max(reading - clock.stamp_s, 0.0)
-        offset = min(offset + CRYSTAL_DRIFT * advance, now - reading)
-    newest = max(reading, clock.stamp_s)
+        laid = _laid(clock, laid, now, reading)
     late = reading < clock.stamp_s
-    state, aligned = _heard(state, stamp.clock, _Clock(offset, newest, wraps), arrival_s, rules and not late, event)
-    return state, aligned._replace(t_s=reading + offset)
+    state, aligned = _heard(state, stamp.clock, laid, arrival_s, rules and not late, event)
+    return state, aligned._replace(t_s=reading + laid.offset_s)
+
+
+def _laid(before: _Clock, clock: _Clock, now: float, reading: float) -> _Clock:
+    """Another clock than ours by the least wait; anew where it was set back, so that everything waits longer."""
+    drift = CRYSTAL_DRIFT * (clock.stamp_s - before.stamp_s)
+    offset = min(before.offset_s + drift, now - reading)
+    late = now - reading - offset
+    if not late > SET_BACK_S:
+        return clock._replace(offset_s=offset)
+    since, least = (now, late) if before.late_since_s != before.late_since_s else (before.late_since_s, before.late_s)
+    least = min(least, late)
+    if now - since < SET_FOR_S:
+        return clock._replace(offset_s=offset, late_since_s=since, late_s=least)
+    return clock._replace(offset_s=offset + least)
 
 
 def told_unix_time(state: ClockState, clock: ClockName, unix_s: float, boot_s: float) -> ClockState:

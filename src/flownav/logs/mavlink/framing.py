@@ -105,6 +105,9 @@ class StreamFrames:
 
     def __init__(self) -> None:
         self.damage: Counter[str] = Counter()
+        self.strange: list[
+            tuple[Frame, int]
+        ] = []  # of messages that nobody knows, of the last piece, and their numbers
         self._check = Check()
         self._rest = b""
 
@@ -112,6 +115,7 @@ class StreamFrames:
         """Every whole frame of a known message, with its bytes. whole: a datagram, in which no frame is left open."""
         content = self._rest + piece
         self._rest = b""
+        self.strange.clear()
         place = 0
         while place < len(content):
             frame = self._check.frame(content, place)
@@ -129,7 +133,13 @@ class StreamFrames:
                 yield frame, content[frame.start : frame.end]
             else:
                 self.damage["unknown_message"] += 1
+                self.strange.append((frame, sequence_of(content, frame.start)))
             place = frame.end
+
+
+def sequence_of(content: bytes, start: int) -> int:
+    """The number of a frame among its sender's."""
+    return content[start + (4 if content[start] == MAVLINK_2 else 2)]
 
 
 class Check:

@@ -218,6 +218,17 @@ def gps_raw_int(
     )
 
 
+def hil_gps(mav: Any, time_us: int, fix_deg_m: tuple[float, float, float], vel_ned_m_s: Vector) -> Message:
+    """HIL_GPS (#113) of a good fix: latitude, longitude [deg], altitude [m]."""
+    north, east, down = (round(v * 1e2) for v in vel_ned_m_s)
+    latitude, longitude, altitude = fix_deg_m
+    return mav.hil_gps_encode(
+        time_us, FIX_3D, round(latitude * 1e7), round(longitude * 1e7), round(altitude * 1e3), 50, 80,
+        round(math.hypot(north, east)), north, east, down,
+        round(math.degrees(math.atan2(east, north)) * 1e2) % 36000, 14,
+    )  # fmt: skip
+
+
 def optical_flow_rad(
     mav: Any, time_us: int, flow: Measurement, interval_s: float, *, distance_m: float = UNKNOWN_DISTANCE_M
 ) -> Message:

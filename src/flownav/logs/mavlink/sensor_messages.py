@@ -120,12 +120,16 @@ def highres_imu(message: Message, t_s: float, context: Context) -> Iterator[Outc
 def scaled_imu(message: Message, t_s: float, context: Context) -> Iterator[Outcome]:
     """SCALED_IMU, 2, 3 (#26, 116, 129): thousandths of g, of rad/s and of gauss, body FRD.
 
-    Traps. A thousandth of g is the accelerometer's resolution. Three zeros of field are no magnetometer.
+    Traps. A thousandth of g is the accelerometer's resolution. Three zeros of field are no magnetometer, six of motion
+    are no IMU: ArduPilot sends SCALED_IMU3 of a vehicle that has two. PX4's IMU is
+    calibrated, without its filter's biases, and its field is the sensor's own, neither calibrated nor turned
+    (streams/SCALED_IMU.hpp): ArduPilot's alone is taken.
     """
     gyro = (MILLI * message.xgyro, MILLI * message.ygyro, MILLI * message.zgyro)
     milli_g = MILLI * GRAVITY_M_S2
-    yield reading(Sensor.IMU, t_s, *gyro, milli_g * message.xacc, milli_g * message.yacc, milli_g * message.zacc)
-    if message.xmag or message.ymag or message.zmag:
+    force = (milli_g * message.xacc, milli_g * message.yacc, milli_g * message.zacc)
+    yield reading(Sensor.IMU, t_s, *gyro, *force) if any((*gyro, *force)) else Dropped(Sensor.IMU, "no_data")
+    if context.ardupilot and (message.xmag or message.ymag or message.zmag):
         yield reading(Sensor.MAG, t_s, MILLI * message.xmag, MILLI * message.ymag, MILLI * message.zmag)
 
 

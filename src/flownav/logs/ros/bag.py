@@ -34,6 +34,15 @@ class Channel(NamedTuple):
     definition_kind: str
 
 
+def one_line(said: object) -> str:
+    """What a library or a bag says, as a message shows it: names in a bag may hold anything."""
+    return " ".join(str(said).split())
+
+
+def _why(error: BaseException) -> str:
+    return one_line(error) or type(error).__name__
+
+
 class Message(NamedTuple):
     """One message: its channel, when it was logged [ns], its bytes."""
 
@@ -52,6 +61,8 @@ class Bag:
 
 
 Wanted = Callable[[Channel], bool]
+# what SQLite's module raises of a file in which bits flipped: a name that is no text, a value larger than memory
+DAMAGED = (sqlite3.Error, OverflowError, UnicodeDecodeError, MemoryError)
 
 
 def sqlite_messages(path: Path, bag: Bag, wanted: Wanted) -> Iterator[Message]:
@@ -68,10 +79,10 @@ def sqlite_messages(path: Path, bag: Bag, wanted: Wanted) -> Iterator[Message]:
                 for number, log_ns, data in rows:
                     if isinstance(log_ns, int) and isinstance(data, bytes) and number in channels:
                         yield Message(channels[number], log_ns, data)
-            except (sqlite3.Error, OverflowError) as error:
-                bag.notes.append(f"{path.name}: damaged ({error}); what follows is left out")
-    except (sqlite3.Error, OverflowError) as error:
-        raise InputError(f"{path}: no readable ROS 2 bag ({error}); give another log") from error
+            except DAMAGED as error:
+                bag.notes.append(f"{path.name}: damaged ({_why(error)}); what follows is left out")
+    except DAMAGED as error:
+        raise InputError(f"{path}: no readable ROS 2 bag ({_why(error)}); give another log") from error
 
 
 def _channels(base: sqlite3.Connection) -> dict[int, Channel]:
@@ -82,7 +93,7 @@ def _channels(base: sqlite3.Connection) -> dict[int, Channel]:
     found = {}
     for number, topic, kind, encoding in base.execute("SELECT id, name, type, serialization_format FROM topics"):
         words, definition_kind = definitions.get(str(kind), ("", ""))
-        found[number] = Channel(str(topic), str(kind), str(encoding), words, definition_kind)
+        found[number] = Channel(one_line(topic), str(kind), str(encoding), words, definition_kind)
     return found
 
 
@@ -100,7 +111,9 @@ def ros1_messages(path: Path, bag: Bag, wanted: Wanted) -> Iterator[Message]:
         raise InputError(f"{path}: no readable ROS 1 bag ({why}); try `rosbag reindex`") from error
     try:
         channels = {
-            connection: Channel(connection.topic, connection.msgtype, "ros1", connection.msgdef.data, "ros1msg")
+            connection: Channel(
+                one_line(connection.topic), connection.msgtype, "ros1", connection.msgdef.data, "ros1msg"
+            )
             for connection in reader.connections
         }
         bag.channels.update(channels.values())

@@ -20,6 +20,7 @@ from flownav.logs.ros.bag import (
     Channel,
     Message,
     Wanted,
+    one_line,
     ros1_messages,
     sqlite_messages,
 )
@@ -74,7 +75,7 @@ class _Walk:
             elif kind == CHANNEL and len(self.channels) < MOST_CHANNELS:
                 number, schema, topic, encoding = _fields(record, "HHSS")
                 name, definition_kind, definition = self.schemas.get(schema, ("", "", ""))
-                channel = Channel(topic, ros2_name(name), encoding, definition, definition_kind)
+                channel = Channel(one_line(topic), ros2_name(name), encoding, definition, definition_kind)
                 self.channels[number] = channel
                 self.bag.channels.add(channel)
                 self.taken.add(number) if self.wanted(channel) else self.taken.discard(number)

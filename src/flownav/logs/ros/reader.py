@@ -18,7 +18,7 @@ from flownav.logs.log import Log, absences_of
 from flownav.logs.plausible import check_plausible, of_one_clock
 from flownav.logs.record_log import is_ours, log_of_export
 from flownav.logs.ros import standard
-from flownav.logs.ros.bag import Bag, Channel, Decoder
+from flownav.logs.ros.bag import Bag, Channel, Decoder, one_line
 from flownav.logs.ros.containers import files_of, messages
 from flownav.logs.ros.topics import NAMES, Clock, Gathered, chosen, clock_of, stamp_of, values_of
 from flownav.logs.ulog import FIELDS, STATES, TOPICS, log_of_topics
@@ -96,7 +96,7 @@ def read_ros(path: Path, *, flow_instance: int | None = None, topics: Mapping[st
         return log_of_export(files[0], flow_instance)
     gathered = _gathered(files, bag, decoder)
     if not gathered:
-        kinds = sorted({f"{channel.topic} ({channel.kind})" for channel in bag.channels})
+        kinds = sorted({one_line(f"{channel.topic} ({channel.kind})") for channel in bag.channels})
         listed = ", ".join(kinds[:TOPICS_SHOWN]) + (" ..." if len(kinds) > TOPICS_SHOWN else "") or "nothing"
         why = f"; of {', '.join(sorted(decoder.undefined))} it lacks the definition" if decoder.undefined else ""
         raise InputError(f"{path}: no message of a known type{why}; the bag holds {listed}")
@@ -148,7 +148,7 @@ def _ros_log(
     asked: Mapping[str, str],
 ) -> Log:  # fmt: skip
     roles, choice = chosen(gathered, asked, flow_instance)
-    clock, clock_notes = clock_of(roles.values())
+    clock, clock_notes = clock_of(topic for role, topic in roles.items() if role not in ("setpoint", "battery"))
     listed, origin = standard.streams_of(roles, clock)
     nothing = "no usable reading of any sensor; record an Imu and a NavSatFix or OpticalFlowRad"
     streams, strays = of_one_clock(path, listed, nothing)
@@ -159,6 +159,7 @@ def _ros_log(
         else None
         for name in ("truth", "autopilot")
     )
+    asked_for, battery = roles.get("setpoint"), roles.get("battery")
     if "range" in roles:
         choice.append(f"range {roles['range'].topic} is taken to look down: its message does not say where it looks")
     return Log(
@@ -166,6 +167,8 @@ def _ros_log(
         own, roles["autopilot"].topic if own is not None else "", standard.limits_of(roles),
         tuple(absences_of(streams, **LACKING)), clock_start_s=clock.start_ns * 1e-9,
         truth_name=roles["truth"].topic if truth is not None else "",
+        setpoints=() if asked_for is None else (standard.asked_table(asked_for, clock.times(asked_for)),),
+        battery=None if battery is None else standard.battery_table(battery, clock.times(battery)),
     )  # fmt: skip
 
 

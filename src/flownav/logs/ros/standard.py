@@ -11,11 +11,12 @@ from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, Table
 from flownav.logs.assembly import Origin, counted, gps_streams, pressure_altitude_m, sensor_stream
 from flownav.logs.log import frd, in_order, ned, ned_from_frd, state_table
-from flownav.logs.ros.topics import POSE, QUATERNION, Clock, Gathered
+from flownav.logs.ros.topics import POSE, QUATERNION, TARGET, Clock, Gathered
 
 GAUSS_PER_TESLA = 1e4
 KNOWN_COVARIANCE = 1  # sensor_msgs/NavSatFix: COVARIANCE_TYPE_APPROXIMATED and above
 LEAST_ROWS = 2
+LOCAL_NED = 1  # MAV_FRAME, of a PositionTarget
 
 
 def streams_of(roles: dict[str, Gathered], clock: Clock) -> tuple[list[Stream], Origin | None]:
@@ -124,6 +125,31 @@ def limits_of(roles: dict[str, Gathered]) -> dict[str, tuple[float, float]]:
         return {}
     low, high = np.median(roles["range"].column("min_range", "max_range"), axis=0).tolist()
     return {"range_m": (low, high)} if 0.0 <= low < high < np.inf else {}
+
+
+def asked_table(topic: Gathered, t_s: Array) -> Table:
+    """Positions that the autopilot was to hold, as its local frame has them; a component that was left open is NaN.
+
+    mavros_msgs/PositionTarget: ENU, since mavros turns MAVLink's (setpoint_raw.cpp); a bit of `type_mask` says: ignore.
+    """
+    place = topic.column("x", "y", "z")
+    if topic.kind == TARGET:
+        mask = topic.column("mask").astype(np.int64)
+        place[(mask & (1, 2, 4)) > 0] = np.nan
+        place[topic.column("frame")[:, 0] != LOCAL_NED] = np.nan
+    place[~(np.abs(place) < 1e6)] = np.nan
+    kept = np.isfinite(place).any(axis=1) & np.isfinite(t_s)
+    order = np.argsort(t_s[kept], kind="stable")
+    return {"t_s": t_s[kept][order], **dict(zip(POSITION_NED, ned(place[kept][order]).T, strict=True))}
+
+
+def battery_table(topic: Gathered, t_s: Array) -> Table | None:
+    """Voltage, current (BatteryState's is negative where it flows out) and what is left; None without a voltage."""
+    voltage, current, share = topic.column("voltage", "current", "percentage").T
+    kept = (voltage > 0.0) & np.isfinite(t_s)
+    order = np.argsort(t_s[kept], kind="stable")
+    told = {"voltage_v": voltage, "current_a": -current, "remaining_percent": 100.0 * share}
+    return {"t_s": t_s[kept][order]} | {name: x[kept][order] for name, x in told.items()} if kept.any() else None
 
 
 def path_table(topic: Gathered, t_s: Array) -> Table | None:

@@ -16,6 +16,7 @@ from flownav.core.measurement import Array
 
 ODOMETRY, POSE_STAMPED = "nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped"
 POSES = (POSE_STAMPED, "geometry_msgs/msg/PoseWithCovarianceStamped", "geometry_msgs/msg/TransformStamped", ODOMETRY)
+TARGET, BATTERY = "mavros_msgs/msg/PositionTarget", "sensor_msgs/msg/BatteryState"
 S_PER_NS = 1e-9
 AGREEING_S = 3600.0  # headers of one clock; a simulator's clock may lie decades from the recorder's
 LONGEST_DELAY_S = 1.0
@@ -58,6 +59,8 @@ FIELDS_READ: dict[str, dict[str, str]] = {
         for name in ("integration_time_us", "integrated_x", "integrated_y", "integrated_xgyro", "integrated_ygyro",
                      "quality", "distance")
     },
+    TARGET: {"frame": "coordinate_frame", "mask": "type_mask", **_xyz("", "position")},
+    BATTERY: {name: name for name in ("voltage", "current", "percentage")},
 }  # fmt: skip
 NAMES = {kind: tuple(columns) for kind, columns in FIELDS_READ.items()}
 VALUES_READ: dict[str, Values] = {kind: attrgetter(*columns.values()) for kind, columns in FIELDS_READ.items()}
@@ -134,6 +137,7 @@ class Role(NamedTuple):
 
 TRUE_WORDS = ("mocap", "vicon", "optitrack", "vrpn", "qualisys", "ground_truth", "groundtruth", "truth", "leica", "gt")
 OWN_WORDS = ("local_position", "estimat", "ekf", "fused", "filtered", "odom")
+ASKED_WORDS = ("target_local", "setpoint", "target")
 NOT_DOWN = ("front", "forward", "left", "right", "back", "rear", "upward")
 ROLES = (
     Role(
@@ -145,8 +149,10 @@ ROLES = (
     Role("mag", ("sensor_msgs/msg/MagneticField",)),
     Role("range", ("sensor_msgs/msg/Range",), ("down", "ground", "rangefinder", "lidar", "sonar", "height"), NOT_DOWN),
     Role("flow", ("mavros_msgs/msg/OpticalFlowRad",)),
-    Role("truth", POSES, TRUE_WORDS, OWN_WORDS),
-    Role("autopilot", POSES, OWN_WORDS, TRUE_WORDS, named=True),
+    Role("truth", POSES, TRUE_WORDS, (*OWN_WORDS, *ASKED_WORDS)),
+    Role("autopilot", POSES, OWN_WORDS, (*TRUE_WORDS, *ASKED_WORDS), named=True),
+    Role("setpoint", (TARGET, POSE_STAMPED), ASKED_WORDS, named=True),
+    Role("battery", (BATTERY,)),
 )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from flownav.core.errors import InputError
 from flownav.core.guard import written_whole
+from flownav.core.marks import marked
 from flownav.core.parameter_files import load
 from flownav.core.version import __version__
 from flownav.logs.log import Log
@@ -16,8 +17,18 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
-from flownav.studies.compare.job import names_of
-from flownav.studies.tuning.knobs import Knob, Split, knobs_of, rounded, split_flights, turned
+from flownav.studies.compare.job import LeftOut, names_of
+from flownav.studies.tuning.knobs import (
+    KNOBS,
+    LEAST_STARTS,
+    Knob,
+    Split,
+    knobs_of,
+    rounded,
+    split_flights,
+    too_short,
+    turned,
+)
 from flownav.studies.tuning.scores import Course, Gains, Trials, course_of, reference_name
 from flownav.studies.tuning.search import UNMOVED, Found, Judged, Judgement, judge, search
 
@@ -58,6 +69,7 @@ class Tuned(NamedTuple):
     judgement: Judgement
     logs: list[OfLog]
     runs: int
+    left_out: list[LeftOut]
 
     @property
     def accepted(self) -> bool:
@@ -71,10 +83,12 @@ def tune(
 ) -> Tuned:  # fmt: skip
     """Settings fitted to some windows of the logs and judged by the others. The order of the logs does not matter.
 
-    stated: what the fit starts from (None: as shipped). InputError where a log is given twice, is too short, holds no
-    sensor whose settings could be tuned, or the filter never starts.
+    stated: what the fit starts from (None: as shipped). Logs that are too short are left out. InputError where all are,
+    where a log is given twice, holds no sensor whose settings could be tuned, or the filter never starts.
     """
     names, order = names_of(paths), _ordered(paths, logs)
+    short = {k: why for k in order if (why := too_short(logs[k]))}
+    order = [k for k in order if k not in short] or order
     logs = [logs[k] for k in order]
     splits = split_flights(logs)
     settings = stated or NavigatorSettingsFile()
@@ -92,13 +106,15 @@ def tune(
         [_of_log(names[k], paths[k], split, course, gain, keys)
          for k, split, course, gain in zip(order, splits, held, gains, strict=True)],
         trials.flown * len(fitted),
+        [(names[k], why) for k, why in short.items()],
     )  # fmt: skip
 
 
 def runs_expected(logs: Sequence[Log]) -> int:
     """About how many replays a tuning takes."""
-    fitted = sum(not split.whole for split in split_flights(logs))
-    return RUNS_A_KNOB * fitted * max(len(knobs_of(log, NavigatorSettingsFile())) for log in logs)
+    logs = [log for log in logs if not too_short(log)] or logs
+    fitted, settings = sum(not split.whole for split in split_flights(logs)), NavigatorSettingsFile()
+    return RUNS_A_KNOB * fitted * max(len(knobs_of(log, settings, starts=fitted >= LEAST_STARTS)) for log in logs)
 
 
 def proposals(found: Found, knobs: Sequence[Knob], settings: NavigatorSettingsFile) -> list[Proposed]:
@@ -127,9 +143,11 @@ def _ordered(paths: Sequence[Path], logs: Sequence[Log]) -> list[int]:
 
 
 def _knobs(courses: Sequence[Course], settings: NavigatorSettingsFile) -> list[Knob]:
-    """Those that any of the logs could turn. InputError where there is none, or nothing to score."""
-    found = [knob for course in courses for knob in knobs_of(course.flown.log, settings)]
-    knobs = sorted(set(found), key=found.index)
+    """Those that any of the logs could turn; of the start, that so many could. InputError where there is none, or
+    nothing to score.
+    """
+    found = [knob for course in courses for knob in knobs_of(course.flown.log, settings, starts=True)]
+    knobs = [knob for knob in KNOBS if found.count(knob) >= (LEAST_STARTS if knob.start else 1)]
     first = courses[0].flown.log.path
     if not any(np.isfinite(course.start.density).any() for course in courses) or not knobs:
         raise InputError(
@@ -154,7 +172,7 @@ def write_settings(path: Path, tuned: Tuned, stated: NavigatorSettingsFile | Non
     """
     try:
         with written_whole(path) as temporary:
-            temporary.write_text(settings_text(tuned, stated, command), encoding="utf-8", errors="backslashreplace")
+            temporary.write_bytes(marked(settings_text(tuned, stated, command)))
             load(temporary, NavigatorSettingsFile)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); give another name") from error
@@ -168,6 +186,7 @@ def settings_text(tuned: Tuned, stated: NavigatorSettingsFile | None, command: s
         "# Settings of flownav's navigator; use them with `flownav replay LOG --settings FILE`.",
         f"# Made with flownav {__version__} by: {' '.join(command.split())}",
         *(f"# {_part(log)}" for log in tuned.logs),
+        *(f"# {_printable(name)}: left out: {why}" for name, why in tuned.left_out),
         f"# Held-out windows: {gain_words(tuned.judgement.error)}.",
         "",
         *(f"{key} = {float(value)!r}" for key, value in kept.items() if key not in proposed),
@@ -187,8 +206,11 @@ def gain_words(error: Judged | None) -> str:
 def _part(log: OfLog) -> str:
     """How a log took part, in one line of a comment."""
     fitted = "held out whole" if log.split.whole else f"fitted on {len(log.split.fit)} windows"
-    name = "".join(character if character.isprintable() else "?" for character in log.name)
-    return f"{name}: {fitted}, judged on {len(log.split.held)}, by {log.reference or 'nothing'}"
+    return f"{_printable(log.name)}: {fitted}, judged on {len(log.split.held)}, by {log.reference or 'nothing'}"
+
+
+def _printable(name: str) -> str:
+    return "".join(character if character.isprintable() else "?" for character in name)
 
 
 def _line(row: Proposed) -> str:

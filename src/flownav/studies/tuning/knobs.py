@@ -21,11 +21,17 @@ MOST_SCALE = 0.35
 FLOW_GAIN = "flow gain"
 
 
+LEAST_STARTS = 3  # a flight starts once: two say nothing of how starts differ
+
+
 SHARES = {"flow_lasting_share": "share of the speed", "range_relative_sigma": "share of the range"}
 
 
 class Knob(NamedTuple):
-    """Settings that one factor moves together; spread: how far the factor's logarithm is expected to be from 0."""
+    """Settings that one factor moves together; spread: how far the factor's logarithm is expected to be from 0.
+
+    start: how much is unknown before the first reading, of which a flight is one sample, however long it lasts.
+    """
 
     name: str
     keys: tuple[str, ...]
@@ -33,6 +39,7 @@ class Knob(NamedTuple):
     sensors: tuple[Sensor, ...]
     spread: float = USUAL_SPREAD
     most: float = MOST_NOISE
+    start: bool = False
 
     def unit_of(self, key: str) -> str:
         """The unit of one of its settings; what is a share of something else has its own."""
@@ -40,6 +47,7 @@ class Knob(NamedTuple):
 
 
 FLOWS = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
+MOVING = (Sensor.IMU, Sensor.ATTITUDE)
 KNOBS = (  # in the order in which they are sought: what moves the path most comes first
     Knob(FLOW_GAIN, ("flow_gain_x", "flow_gain_y"), "reported over true", FLOWS, SCALE_SPREAD, MOST_SCALE),
     Knob("gyro noise", ("gyro_noise_rad_s_rt_hz",), "rad/s per root hertz", (Sensor.IMU,)),
@@ -55,17 +63,28 @@ KNOBS = (  # in the order in which they are sought: what moves the path most com
     Knob("magnetometer and heading noise", ("heading_noise_rad",), "rad", (Sensor.MAG, Sensor.YAW)),
     Knob("attitude noise", ("ins_tilt_white_rad",), "rad", (Sensor.ATTITUDE,)),
     Knob("external position noise", ("pose_sigma_m",), "m", (Sensor.POSE,)),
+    Knob("gyro bias at the start", ("gyro_bias_sigma_rad_s",), "rad/s", (Sensor.IMU,), start=True),
+    Knob("accelerometer bias at the start", ("accel_bias_sigma_m_s2",), "m/s2", (Sensor.IMU,), start=True),
+    Knob("velocity at the start", ("start_velocity_sigma_m_s",), "m/s", (*MOVING, *FLOWS), start=True),
+    Knob("flow scale at the start", ("flow_scale_sigma",), "share of the flow", FLOWS, start=True),
+    Knob("compass deviation at the start", ("compass_sigma_rad",), "rad", (Sensor.MAG,), start=True),
+    Knob("heading error at the start", ("ins_heading_sigma_rad",), "rad", (Sensor.MAG, Sensor.ATTITUDE), start=True),
+    Knob("GPS velocity's lag at the start", ("gps_velocity_lag_sigma_s",), "s", (Sensor.GPS_VELOCITY,), start=True),
 )
 
 
-def knobs_of(log: Log, settings: NavigatorSettingsFile) -> list[Knob]:
-    """Those whose sensor serves in a log and whose settings are not 0; a gain only where something tells the speed."""
+def knobs_of(log: Log, settings: NavigatorSettingsFile, *, starts: bool = False) -> list[Knob]:
+    """Those whose sensor serves in a log and whose settings are not 0; a gain only where something tells the speed.
+
+    starts: those of the start too.
+    """
     serving = {sensor for sensor, stream in log.streams.items() if len(stream)}
     serving.discard(Sensor.ATTITUDE if imu_serves(log.streams) else Sensor.IMU)
     scaled = log.truth is not None or bool(serving & {Sensor.GPS_POSITION, Sensor.POSE})
     return [
         knob for knob in KNOBS
         if serving & set(knob.sensors)
+        and (starts or not knob.start)
         and all(getattr(settings, key) > 0.0 for key in knob.keys)
         and (scaled or knob.name != FLOW_GAIN)
     ]  # fmt: skip
@@ -125,18 +144,27 @@ def split_flight(log: Log) -> Split:
 
     InputError where the flight is too short for LEAST_JUDGES of each kind.
     """
-    flown = airborne_of(log)
-    first, last = log.span_s if flown is None else flown
+    first, last = _flight_of(log)
     length = _length(last - first)
-    if length < SHORTEST_S:
-        what = "the log" if flown is None else "the flight"
-        raise InputError(
-            f"{log.path}: {what} lasts {last - first:.1f} s, too short for {2 * LEAST_JUDGES} windows of "
-            f"{SHORTEST_S:g} s; give a log of {2 * LEAST_JUDGES * SHORTEST_S:g} s or more"
-        )
+    if why := too_short(log):
+        raise InputError(f"{log.path}: {why}; give a log of {2 * LEAST_JUDGES * SHORTEST_S:g} s or more")
     count = int((last - first) / length + 1e-9)
     windows = [(first + k * length, first + (k + 1.0 - GAP_SHARE) * length) for k in range(count)]
     return Split(tuple(windows[::2]), tuple(windows[1::2]))
+
+
+def too_short(log: Log) -> str | None:
+    """Why a log cannot be cut into windows enough; None where it can."""
+    first, last = _flight_of(log)
+    if _length(last - first) >= SHORTEST_S:
+        return None
+    what = "the log" if airborne_of(log) is None else "the flight"
+    return f"{what} lasts {last - first:.1f} s, too short for {2 * LEAST_JUDGES} windows of {SHORTEST_S:g} s"
+
+
+def _flight_of(log: Log) -> Window:
+    """From lift-off to touchdown; the whole log where nobody says when that was."""
+    return airborne_of(log) or log.span_s
 
 
 def _length(flight_s: float) -> float:

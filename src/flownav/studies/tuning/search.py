@@ -47,6 +47,14 @@ def interval_of(drawn: Array, windows: int) -> tuple[float, float]:
     return float(low), float(high)
 
 
+def student_of(values: Array) -> tuple[float, float]:
+    """CONFIDENCE interval of the mean of a few values (n,) by Student's t; a bootstrap of three holds it too seldom."""
+    from scipy.special import stdtrit
+
+    half = stdtrit(len(values) - 1.0, 0.5 * (1.0 + CONFIDENCE)) * np.std(values, ddof=1) / np.sqrt(len(values))
+    return float(np.mean(values) - half), float(np.mean(values) + half)
+
+
 # -- the verdict -------------------------------------------------------------------------------------------------
 ACCEPTED, NOT_ACCEPTED = "accepted", "not accepted"
 
@@ -219,7 +227,8 @@ def _top(trials: Trials, best: Array, k: int, limits: tuple[float, float]) -> To
     from the start, and drawn to it by the prior. Where the profile has no top: that place, and the limits.
 
     By the sandwich of an M-estimator (Huber, Robust Statistics, 1981, section 6.3): the slope of the mean over windows
-    when they are drawn anew, over the curvature of the profile, which is a parabola by least squares.
+    when they are drawn anew, over the curvature of the profile, which is a parabola by least squares. What is unknown
+    at a start differs from log to log and not from window to window: there the logs are the sample.
     """
     span = _step(trials, k, STEPS[0])
     places = np.unique(np.clip(best[k] + span * np.array(PROFILE_STEPS), *limits))
@@ -230,8 +239,13 @@ def _top(trials: Trials, best: Array, k: int, limits: tuple[float, float]) -> To
     curvature = 2.0 * float(parabola[0] @ mean)
     if curvature >= 0.0:
         return Top(float(best[k]), limits)
-    slope, drawn = float(parabola[1] @ mean), resampled(by_log, MEASURED_SEED) @ parabola[1]
-    ends = interval_of(best[k] - drawn / curvature, _windows(flown[0]))
+    slope = float(parabola[1] @ mean)
+    if trials.knobs[k].start:
+        slopes = np.array([values.mean(axis=0) @ parabola[1] for values in by_log])
+        ends = student_of(best[k] - slopes / curvature)
+    else:
+        drawn = resampled(by_log, MEASURED_SEED) @ parabola[1]
+        ends = interval_of(best[k] - drawn / curvature, _windows(flown[0]))
     place, low, high = np.clip([best[k] - slope / curvature, *ends], *limits)
     return Top(float(place), (float(low), float(high)))
 

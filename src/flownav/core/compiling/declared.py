@@ -1,0 +1,41 @@
+"""What the compiler must be told of equations, kept until something is compiled: kernels that are kept need none of it.
+
+Numba takes a third of a second to import, and as long again to be told of a thousand equations. A process that only
+runs what was compiled before never does either (`loaded`). One that has Numba already tells it at once, so that
+functions compiled by Numba itself can call equations.
+"""
+
+import sys
+import threading
+from collections.abc import Callable
+from importlib import import_module
+
+TAUGHT = "flownav.core.compiling.taught"  # by name: what it imports has left word here
+_lock = threading.RLock()
+_waiting: list[Callable[[], object]] = []
+_begun = False
+
+
+def when_compiling(declare: Callable[[], object]) -> None:
+    """Do this before anything is compiled, in the order of these calls."""
+    with _lock:
+        _waiting.append(declare)
+        if _begun:
+            _declare()
+        elif "numba" in sys.modules:
+            begin_compiling()
+
+
+def begin_compiling() -> None:
+    """Import the compiler and tell it all that it must know; from then on it is told at once."""
+    global _begun
+    with _lock:
+        if not _begun:
+            _begun = True
+            import_module(TAUGHT)
+        _declare()
+
+
+def _declare() -> None:
+    while _waiting:
+        _waiting.pop(0)()

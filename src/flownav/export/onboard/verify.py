@@ -1,0 +1,106 @@
+"""`flownav verify`: what a board or a browser says of a flight, held against the same flight computed here."""
+
+import hashlib
+import re
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor
+from flownav.export.onboard.board import Board
+from flownav.export.onboard.interface import Rates
+from flownav.export.onboard.package import Flight, pace_of, packed_settings, readings_of
+from flownav.navigation.rings import Given
+
+DIGEST = re.compile(r"[0-9a-fA-F]{16}")
+LINE = re.compile(r"\s*(\d+)\s+(?:0x)?([0-9a-fA-F]{16})\b")
+MOST_LINES = 1_000_000
+
+
+class Said(NamedTuple):
+    """What is said: after how many readings (None: after all), which digest."""
+
+    readings: int | None
+    digest: int
+
+
+class Found(NamedTuple):
+    """What came of it: how many digests were compared, how many are the same, and where the first difference is.
+
+    same: after how many readings the last digest before it was still right; differs: after how many it is wrong, and
+    what was read then.
+    """
+
+    compared: int
+    equal: int
+    digest: str
+    same: int | None = None
+    differs: int | None = None
+    t_s: float | None = None
+    sensor: str | None = None
+    expected: str | None = None
+    said: str | None = None
+
+
+def said_by(what: str) -> list[Said]:
+    """What a digest, or a file with a line for each (readings, digest), says. InputError where it is neither."""
+    if DIGEST.fullmatch(what):
+        return [Said(None, int(what, 16))]
+    path = Path(what)
+    if not path.is_file():
+        raise InputError(
+            f"{what}: neither 16 hexadecimal digits, nor a file of digests, nor a folder of `flownav build`"
+        )
+    text = path.read_text(encoding="utf-8", errors="replace")
+    found = [Said(int(m[1]), int(m[2], 16)) for m in map(LINE.match, text.splitlines()[:MOST_LINES]) if m]
+    if not found:
+        raise InputError(f"{what}: no line of it is a number of readings and 16 hexadecimal digits")
+    if any(b.readings <= a.readings for a, b in pairwise(found)):  # type: ignore[operator]
+        raise InputError(f"{what}: the numbers of readings do not grow; it holds more than one run")
+    return found
+
+
+def compare(said: Sequence[Said], given: Sequence[Given], board: Board) -> Found:
+    """Feed the readings here, and hold each digest against what is said. InputError where more was read."""
+    last = max((each.readings for each in said if each.readings is not None), default=0)
+    if last > len(given):
+        raise InputError(f"a digest is said of {last} readings, and the flight has {len(given)}: it is another flight")
+    after = {each.readings if each.readings is not None else len(given): each.digest for each in said}
+    equal, same = 0, 0
+    for count, reading in enumerate(given, 1):
+        board.take(reading)
+        if count not in after:
+            continue
+        if count == len(given) and said[-1].readings is None:
+            board.finish()
+        if board.digest() != after[count]:
+            where = reading.t_s, Sensor(reading.sensor).name.lower()
+            return Found(len(said), equal, _hex(board), same, count, *where, _hex(board), f"{after[count]:016x}")
+        equal, same = equal + 1, count
+    return Found(len(said), equal, _hex(board))
+
+
+def _hex(board: Board) -> str:
+    return f"{board.digest():016x}"
+
+
+def board_for(flight: Flight, rates: Rates, without: tuple[str, ...] = ()) -> Board:
+    """A board here, for a flight's settings."""
+    settings, lag = packed_settings(flight, pace_of(flight.settings, rates.horizon_s, without))
+    return Board(settings, rates.sizes, lag=lag)
+
+
+def verified(said: Sequence[Said], flight: Flight, rates: Rates) -> Found:
+    """What is said of a whole flight, compared."""
+    return compare(said, readings_of(flight), board_for(flight, rates))
+
+
+# -- a folder -------------------------------------------------------------------------------------------------
+def changed_files(folder: Path, manifest: dict[str, Any]) -> Iterator[str]:
+    """Files that are not as they were written."""
+    for name, digest in manifest["files"].items():
+        file = folder / Path(name).name
+        if not file.is_file() or hashlib.sha256(file.read_bytes()).hexdigest() != digest:
+            yield name

@@ -1,0 +1,107 @@
+"""Who of those heard on a link is the vehicle's autopilot: by what its HEARTBEAT says it is, and by what it tells.
+
+One HEARTBEAT is one witness. A gimbal may say that it is an autopilot, and another vehicle's may be heard first; an
+autopilot that is asked tells how it moves and where it is. Until an estimate is sent a better one is taken in place of
+the first; from then on it is only said.
+"""
+
+from dataclasses import dataclass
+
+from flownav.logs.mavlink.framing import ARDUPILOT, INVALID_AUTOPILOT, PX4, Message, dialect
+
+Who = tuple[int, int]  # system and component
+AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
+# MAV_TYPE of what is no vehicle: antenna tracker, ground station, onboard controller, gimbal, ADS-B, camera, charging
+# station, FLARM, servo, remote identification, battery, parachute, log, OSD, IMU, GPS, winch, illuminator
+NO_VEHICLES = {5, 6, 18, 26, 27, 30, 31, 32, 33, 34, 36, 37, 38, 39, 40, 41, 42, 44}
+NONE, COMPONENT, VEHICLE, KNOWN = range(4)  # what a HEARTBEAT makes of its sender, the better later
+MOVES = ("HIGHRES_IMU", "RAW_IMU", "SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3", "ATTITUDE", "ATTITUDE_QUATERNION")
+PLACES = ("GPS_RAW_INT", "OPTICAL_FLOW", "OPTICAL_FLOW_RAD")
+TURN_S = 5.0  # to tell both: chosen; an autopilot that answers was asked for all within 2 s (test_live_recordings)
+MOST = 64  # that are remembered: chosen
+
+
+def standing(component: int, kind: int, make: int, *, named: bool = False) -> int:
+    """What a HEARTBEAT makes of its sender; kind: MAV_TYPE, make: MAV_AUTOPILOT.
+
+    NONE: no autopilot. COMPONENT: it says so, with another component's number. VEHICLE: an autopilot by its number as
+    well. KNOWN: of a make whose streams we know. named: it was asked for by its number, which is enough.
+    """
+    if make == INVALID_AUTOPILOT:
+        return NONE
+    if kind in NO_VEHICLES and not named:
+        return NONE
+    if component != AUTOPILOT and not named:
+        return COMPONENT
+    return KNOWN if make in (ARDUPILOT, PX4) else VEHICLE
+
+
+@dataclass
+class Heard:
+    """One that may be the autopilot.
+
+    moves, places: whether it told how it moves and where it is. turn_s: our clock when it was taken, None while it
+    never was.
+    """
+
+    who: Who
+    make: int
+    standing: int
+    moves: bool = False
+    places: bool = False
+    turn_s: float | None = None
+
+    @property
+    def told(self) -> int:
+        """How much of what is needed it has told: 0, 1 or 2, which is all."""
+        return self.moves + self.places
+
+    def may_serve(self, now_s: float, *, taken: bool) -> bool:
+        """Whether it has told all, or has not had its time to; taken: it is the one that is listened to."""
+        return self.told == 2 or self.turn_s is None or (taken and now_s - self.turn_s <= TURN_S)
+
+
+class Autopilots:
+    """All that were heard. component: the one that is asked for, if any."""
+
+    def __init__(self, component: int | None = None) -> None:
+        self._named = component is not None
+        self.heard: dict[Who, Heard] = {}
+        self._moves, self._places = map(_numbers, (MOVES, PLACES))
+
+    def heartbeat(self, who: Who, message: Message) -> Heard | None:
+        """Note its sender; None where that is no autopilot."""
+        make = int(message.autopilot)
+        found = standing(who[1], int(message.type), make, named=self._named)
+        if found == NONE or (who not in self.heard and len(self.heard) >= MOST):
+            return None
+        known = self.heard.setdefault(who, Heard(who, make, found))
+        known.standing = max(known.standing, found)
+        return known
+
+    def told(self, who: Who, number: int) -> None:
+        """A message of one of them."""
+        known = self.heard.get(who)
+        if known is not None:
+            known.moves = known.moves or number in self._moves
+            known.places = known.places or number in self._places
+
+    def better(self, who: Who, now_s: float) -> Heard | None:
+        """Who is to be taken in place of the one that is; None where nobody is better."""
+        current, heard = self.heard.get(who), list(self.heard.values())
+        if current is None:
+            return None
+        current.turn_s = now_s if current.turn_s is None else current.turn_s
+        serving = [one for one in heard if one.may_serve(now_s, taken=one is current)]
+        if serving:
+            best = max(serving, key=lambda one: (one.told == 2, one.standing, one.told, one is current))
+        else:  # of those that tell nothing one after the other is asked
+            best = max(heard, key=lambda one: (one.told, one is current and one.told > 0, -(one.turn_s or 0.0)))
+        if best is current:
+            return None
+        best.turn_s = now_s
+        return best
+
+
+def _numbers(names: tuple[str, ...]) -> frozenset[int]:
+    return frozenset(int(getattr(dialect(), f"MAVLINK_MSG_ID_{name}")) for name in names)

@@ -1,0 +1,95 @@
+"""What of the estimate of now may be sent: alarms of sensors that do not serve, limits, and what contradicts it."""
+
+from flownav.core.measurement import Sensor
+from flownav.estimation.gating import Reason
+from flownav.live.anchor import PLACES, Anchor
+from flownav.live.answers import UNFUSED, estimate_of, fault_of, why_withheld
+from flownav.live.filtering import Filtering, Keeper
+from flownav.live.hearing import GPS, Hearing
+from flownav.live.horizon import Refused
+from flownav.live.inertial import Heights
+from flownav.live.options import Limits
+from flownav.live.vehicle_clock import VehicleClock
+from flownav.logs.mavlink.outgoing import Estimate
+from flownav.navigation.reasons import HORIZONTAL
+
+HEIGHT_DOUBTED = "height_doubted"
+# What a sensor that does not serve may cause.
+OUTRANKED = ("", "position_invalid", "dead_reckoning", "flow_doubted", "unprotected")
+NAN = float("nan")
+
+
+class Offering:
+    """Judges the estimate before it is sent.
+
+    alarms: sensors that are heard and not fused, since when and why; past_alarms: the longest of each sensor; settled:
+    an estimate was there to be sent, so that the vehicle is the vehicle.
+    """
+
+    def __init__(self, limits: Limits, keeper: Keeper, hearing: Hearing, filtering: Filtering) -> None:
+        self.limits, self.keeper, self.hearing, self.filtering = limits, keeper, hearing, filtering
+        self.anchor, self.heights = Anchor(), Heights()
+        self.alarms: dict[Sensor, Refused] = {}
+        self.past_alarms: dict[Sensor, Refused] = {}
+        self.settled = False
+
+    def begin_anew(self) -> None:
+        """The vehicle may be elsewhere now."""
+        self.anchor.begin_anew()
+        self.heights.clear()
+        self.alarms = {}
+
+    def watch(self, t_s: float) -> None:
+        """Alarms that begin and end go into the record."""
+        if self.filtering.running is not None:
+            self.anchor.watch(self.filtering.running, t_s)
+        found = self.hearing.serving.alarms(t_s, self.limits.unfused_s)
+        for sensor in found.keys() - self.alarms.keys():
+            spell = found[sensor]
+            self.keeper.note(t_s, sensor.name.lower(), "unfused", spell.why, t_s - spell.since_s)
+        for sensor in self.alarms.keys() - found.keys():
+            self.keeper.note(t_s, sensor.name.lower(), "fused_again", "", NAN)
+        for sensor, spell in found.items():
+            before = self.past_alarms.get(sensor)
+            if before is None or spell.until_s - spell.since_s >= before.until_s - before.since_s:
+                self.past_alarms[sensor] = spell
+        self.alarms = found
+
+    def _spoils(self, sensor: Sensor, t_s: float) -> bool:
+        """Whether a sensor that does not serve keeps the estimate from being sent: any that tells where the vehicle is,
+        but a GPS that is refused while the flow, which nobody doubts, agrees with the inertial sensors."""
+        refused = self.alarms[sensor].why == Reason.INNOVATION_GATE.label
+        return sensor in HORIZONTAL and not (sensor in GPS and refused and self.anchor.agrees(t_s))
+
+    def judged(self, t_s: float, clock: VehicleClock, resets: int) -> tuple[str, Estimate | None]:
+        """Why the estimate of now may not be sent, "" where it may, and the estimate; None where its velocity may not
+        be sent either."""
+        on, limits = self.filtering.running, self.limits
+        base = self.anchor.base
+        reason = why_withheld(on, t_s, self.hearing.newest_s, limits, base)
+        if reason in OUTRANKED and any(self._spoils(sensor, t_s) for sensor in self.alarms):
+            reason = UNFUSED
+        if not reason and on is not None and on.told.equipment.use_imu:
+            reason = "" if t_s - self.filtering.newest_imu_s <= limits.age_s else "stale"
+        if on is not None and self.heights.doubted(on.clock_s) and reason in ("", *PLACES):
+            reason = HEIGHT_DOUBTED
+        if not reason and not self.settled and self.hearing.origin.doubted is not None:
+            reason = "origin_doubted"
+        if on is None or (reason and reason not in PLACES):
+            return reason, None
+        offset_ned_m = self.hearing.origin.offset_ned_m
+        estimate = estimate_of(on, self.filtering.now(t_s), t_s, clock.boot_s(t_s), resets, offset_ned_m, limits, base)
+        fault = fault_of(estimate, limits, base)
+        if fault and (not reason or fault not in PLACES):
+            reason = fault
+        return reason, estimate if not reason or reason in PLACES else None
+
+    def say_origin(self, event: str, t_s: float) -> None:
+        """What became of an origin goes into the record."""
+        origin = self.hearing.origin
+        if event == "moved":
+            offset_m = sum(value**2 for value in origin.offset_ned_m) ** 0.5
+            self.keeper.note(t_s, "origin", "moved", "the autopilot set its origin; what is sent is about it", offset_m)
+        elif event == "refused":
+            self.hearing.counts["origin: refused"] += 1
+            self.keeper.note(t_s, "origin", "refused", "the vehicle is not where this origin would have it")

@@ -1,0 +1,57 @@
+"""The text form of a DataFlash log (.log), as a ground station downloads it: its lines as the messages that they were.
+
+A line is a message's name and its values, `GPS, 3, 109214400, ...`; FMT lines describe the others, as FMT messages do.
+Numbers of the characters c, C, e, E are divided by 100 there, degrees of L by 1e7, and a mode is its name.
+"""
+
+import re
+import struct
+from collections.abc import Iterator
+
+from flownav.logs.dataflash import formats
+
+LOOKED_AT_BYTES = 4096  # the firmware's name and a few numbers stand before the first line
+_FIRST = re.compile(rb"^FMT, ?128, ?89, ?FMT,", re.MULTILINE)
+_SIZES = {"n": 4, "N": 16, "Z": 64}
+_STRUCT = {code: kind for code, kind in formats.CODES.items() if code not in formats.NOT_NUMBERS}
+_LETTERS = {"i1": "b", "u1": "B", "<i2": "h", "<u2": "H", "<i4": "i", "<u4": "I", "<i8": "q", "<u8": "Q", "<f2": "e",
+            "<f4": "f", "<f8": "d"}  # fmt: skip
+
+
+def is_text(head: bytes) -> bool:
+    """Whether a file's first bytes are those of the text form."""
+    return _FIRST.search(head) is not None
+
+
+def binary_of(content: bytes) -> bytes:
+    """The messages of a text, as the vehicle would have written them; a line that is none is left out."""
+    return b"".join(_messages(content))
+
+
+def _messages(content: bytes) -> Iterator[bytes]:
+    kinds: dict[str, tuple[int, str]] = {formats.FMT.name: (formats.FMT_TYPE, formats.FMT.codes)}
+    for line in content.decode("latin-1").splitlines():
+        name, _, rest = line.partition(",")
+        known = kinds.get(name)
+        if known is None:
+            continue
+        kind, codes = known
+        values = [value.strip() for value in rest.split(",", len(codes) - 1)] if codes else []
+        try:
+            if name == formats.FMT.name:
+                kinds.setdefault(values[2], (int(values[0]), values[3]))
+            yield bytes((*formats.HEAD, kind)) + b"".join(_packed(*each) for each in zip(codes, values, strict=True))
+        except (ValueError, OverflowError, struct.error, KeyError, IndexError):
+            continue
+
+
+def _packed(code: str, value: str) -> bytes:
+    """A value as bytes; ValueError and the like where it is none."""
+    if code in _SIZES:
+        return value.encode("latin-1")[: _SIZES[code]].ljust(_SIZES[code], b"\0")
+    if code == "M":
+        return bytes([int(value) if value.isdigit() else 0])
+    kind = "<" + _LETTERS[_STRUCT[code]]
+    if code in "fdg":
+        return struct.pack(kind, float(value))
+    return struct.pack(kind, round(float(value) * formats.DIVISORS[code]) if code in formats.DIVISORS else int(value))

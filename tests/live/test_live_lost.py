@@ -1,0 +1,157 @@
+"""Recordings of real autopilots' simulators in which flownav was lost, or led its vehicle astray (shared data)."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from flownav.core.frames import GRAVITY_M_S2
+from flownav.core.measurement import Sensor
+from flownav.live.filtering import Keeper
+from flownav.logs.mavlink.framing import coder
+from recorded_link import Arrival, arrivals, play
+
+RAW_IMU = 27
+
+
+class Notes(Keeper):
+    """The happenings of a session."""
+
+    def __init__(self):
+        self.all = []
+
+    def note(self, t_s, source, kind, detail, value=float("nan")):
+        self.all.append((t_s, source, kind, detail))
+
+    def when(self, kind):
+        return [t_s for t_s, _, what, _ in self.all if what == kind]
+
+
+def with_others(heard, truth, messages):
+    """Beside each second RAW_IMU of a recording other sensors of the vehicle: what the simulator's truth would have an
+    accelerometer feel, by the slope of its velocity, with a bias and noise of their own; the gyro as RAW_IMU tells it.
+    """
+    mav, chance, turns = coder(1, 1), np.random.default_rng(9), 0
+    slope = CubicSpline(truth["boot_s"], np.column_stack([truth[f"vel_{a}_m_s"] for a in "ned"])).derivative()
+    angles = CubicSpline(
+        truth["boot_s"], np.unwrap(np.column_stack([truth[f"{n}_rad"] for n in ("roll", "pitch", "yaw")]), axis=0)
+    )
+    bias_m_s2 = chance.normal(0.0, 0.1, (len(messages), 3))
+    for arrival in heard:
+        yield arrival
+        if arrival.message_id != RAW_IMU:
+            continue
+        turns += 1
+        raw = mav.decode(bytearray(arrival.frame))
+        t_s = raw.time_usec * 1e-6
+        if turns % 2 or not truth["boot_s"][0] < t_s < truth["boot_s"][-1]:
+            continue
+        rotation = Rotation.from_euler("xyz", angles(t_s)).as_matrix()
+        force = rotation.T @ (slope(t_s) - [0.0, 0.0, GRAVITY_M_S2])
+        for number, message in enumerate(messages):
+            felt = force + bias_m_s2[number] + chance.normal(0.0, 0.05, 3)
+            milli_g = [round(value * 1e3 / GRAVITY_M_S2) for value in felt]
+            encode = getattr(mav, f"{message.lower()}_encode")
+            told = encode(round(t_s * 1e3), *milli_g, raw.xgyro, raw.ygyro, raw.zgyro, 0, 0, 0)
+            yield Arrival(arrival.now_s, bytes(told.pack(mav)))
+
+
+class Played:
+    """A recording that was played: notes, and what was sent beside the truth."""
+
+    def __init__(self, folder, until_s, others=()):
+        self.notes = Notes()
+        truth = np.genfromtxt(folder / "truth.csv", delimiter=",", names=True)
+        heard = with_others(arrivals(folder, until_s), truth, others)
+        self.session, self.sent = play(heard, keeper=self.notes)
+        told = [message for _, message in self.sent if message.msgname == "ODOMETRY"]
+        self.t_s = np.array([message.time_usec * 1e-6 for message in told])
+        place = np.array([[message.x, message.y, message.z] for message in told]).reshape(-1, 3)
+        true = np.column_stack([np.interp(self.t_s, truth["boot_s"], truth[f"pos_{a}_m"]) for a in "ned"])
+        self.error_m = place - true
+        self.resets = np.array([message.reset_counter for message in told])
+        self.yaw_rad = np.array(
+            [np.arctan2(2 * (m.q[0] * m.q[3] + m.q[1] * m.q[2]), 1 - 2 * (m.q[2] ** 2 + m.q[3] ** 2)) for m in told]
+        )
+        self.true_yaw_rad = np.interp(self.t_s, truth["boot_s"], np.unwrap(truth["yaw_rad"]))
+
+    def between(self, since_s, until_s):
+        return (self.t_s >= since_s) & (self.t_s < until_s)
+
+    def longest_gap_s(self, since_s):
+        later = self.t_s[self.t_s >= since_s]
+        return max(b - a for a, b in pairwise(later))
+
+
+@pytest.fixture
+def played(data_folder):
+    """A recording's name, and until when; played."""
+
+    def of(name, until_s=float("inf"), others=()):
+        make = "px4-live" if name.startswith("px4") else "ardupilot-live"
+        return Played(data_folder / make / name, until_s, others)
+
+    return of
+
+
+def test_a_vehicle_without_gps_is_sent_an_estimate_within_seconds(played):
+    """ArduPilot tells of a receiver that it does not have; a navigator waited for its fix, and nobody could arm."""
+    found = played("no-gps-never-sends", 40.0)
+    assert found.t_s[0] - 17.8 < 5.0  # the vehicle's time when it is first heard
+    assert found.longest_gap_s(0.0) < 0.2
+    assert np.abs(found.error_m).max() < 0.15
+    assert not found.session.hearing.gps_heard
+
+
+def test_flow_that_cannot_be_believed_is_said_and_its_end_is_a_counted_reset(played):
+    """10 s of noise from 75.4 s: nothing was sent for 38 s, and what came back was 5 m off without a reset."""
+    found = played("flow-noise-silence")
+    withheld = [t_s for t_s in found.notes.when("withheld") if t_s > 75.0]
+    assert withheld[0] < 76.5
+    before = found.between(75.0, withheld[0])
+    assert np.hypot(*found.error_m[before, :2].T).max() < 1.0
+    anchored = found.notes.when("anchored")[0]  # once more later, without a gap, which is no jump
+    assert anchored < 85.5 + 2.0
+    after = found.between(anchored, np.inf)
+    assert set(found.resets[after]) == {found.resets[before][-1] + 1}
+    velocities = [now_s for now_s, message in found.sent if message.msgname == "VISION_SPEED_ESTIMATE"]
+    assert len(velocities) > 20.0 * (anchored - withheld[0])
+    assert found.longest_gap_s(anchored) < 0.2
+
+
+def test_a_stuck_accelerometer_is_not_flown_on(played):
+    """From 68.6 to 74.6 s it says 3 m/s2 on all axes: down was wrong by 553 m, with quality 41 to 71."""
+    found = played("accel-stuck", 85.0)
+    assert ("imu", "stuck") in [(source, kind) for _, source, kind, _ in found.notes.all]
+    assert np.abs(found.error_m[found.between(60.0, 85.0)]).max() < 0.5
+    during = found.between(69.2, 74.5)
+    assert not during.any()
+    again = found.t_s[found.t_s > 74.5]
+    assert again[0] < 74.6 + 2.0
+    assert found.session.reason == ""
+
+
+@pytest.mark.parametrize("others", [("SCALED_IMU2",), ("SCALED_IMU2", "SCALED_IMU3")])
+def test_another_accelerometer_flies_on_while_one_is_stuck(played, others):
+    """The same recording of a vehicle with more than one of them."""
+    found = played("accel-stuck", 85.0, others)
+    assert "imu" in [source for _, source, _, _ in found.notes.all]
+    assert np.abs(found.error_m[found.between(60.0, 85.0)]).max() < 0.5
+    assert found.longest_gap_s(60.0) < 0.3
+    assert found.session.reason == ""
+
+
+def test_the_heading_holds_without_gps(played):
+    """A turn of 1.5 deg/s at lift-off was learnt as the gyro's bias, and the heading ran away by that ever since."""
+    found = played("px4-no-gps-heading")
+    flying = found.t_s > 39.0
+    off_rad = np.remainder(found.yaw_rad - found.true_yaw_rad + np.pi, 2.0 * np.pi) - np.pi
+    assert np.degrees(np.abs(off_rad[flying])).max() < 8.0  # the field that PX4 tells has EKF2's own bias taken off
+    assert np.hypot(*found.error_m[flying, :2].T).max() < 1.0
+    assert found.longest_gap_s(0.0) < 0.3
+    assert found.session.dropped["link: lost"] < 10  # frames of messages that nobody knows are not lost
+    assert found.session.hearing.readings[Sensor.MAG] > 500

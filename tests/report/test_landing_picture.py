@@ -1,0 +1,109 @@
+"""The picture of a landing: to scale, where the record says it was, and moved along the record's own path."""
+
+from __future__ import annotations
+
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from tests.helpers.report_records import flight, navigated
+
+from flownav.report.html import render
+from flownav.report.landing import FRAMES, landing_picture
+
+SVG = "{http://www.w3.org/2000/svg}"
+JOKER = {"main_rotor.radius_m": {"value": 0.89}, "main_rotor.hub_above_cg_m": 0.25, "tail_rotor.behind_cg_m": 1.065,
+         "tail_rotor.radius_m": 0.155, "skids.cg_above_skid_m": 0.0}  # fmt: skip
+
+
+def landed(**more):
+    """The made landing, which touched 0.35 m north and 0.12 m east of the centre of a pad of 3 m."""
+    record = navigated()
+    contact = record.manifest["scores"]["touchdown"]["contact"]
+    contact |= {"north_m": 0.35, "east_m": 0.12, "distance_m": float(np.hypot(0.35, 0.12))}
+    record.manifest["pad_size_m"] = 3.0
+    record.manifest.setdefault("parameters", {})
+    record.manifest["parameters"] |= {"vehicle": JOKER, "scenario": {"wind": {"speed_20ft_m_s": 4.0,
+                                                                              "from_direction_deg": 90.0}}}  # fmt: skip
+    record.manifest |= more
+    return record
+
+
+def views(record, **options):
+    root = ElementTree.fromstring(landing_picture(record, **options).svg)
+    return root.findall(f"{SVG}g")
+
+
+def floats(text):
+    return np.array([float(number) for number in re.findall(r"-?\d+\.?\d*", text)])
+
+
+def test_the_vehicle_the_pad_and_the_touchdown_are_to_one_scale():
+    _, above, _ = views(landed())
+    pad = next(one for one in above.iter(f"{SVG}rect") if one.get("class") == "pad")
+    scale = float(pad.get("width")) / 3.0
+    rotor = next(above.iter(f"{SVG}circle"))
+    assert float(rotor.get("r")) == pytest.approx(0.89 * scale, abs=0.1)
+    centre = np.array([float(pad.get("x")), float(pad.get("y"))]) + 1.5 * scale
+    cross = next(one for one in above.iter(f"{SVG}path") if one.get("class") == "cross")
+    corner = floats(cross.get("d"))[:2] + 6.0
+    assert (corner - centre) / scale == pytest.approx([0.12, -0.35], abs=0.02)
+    wind = next(one for one in above.iter(f"{SVG}g") if one.find(f"{SVG}path[@class='wind']") is not None)
+    assert wind.get("transform").endswith("rotate(270)")  # from the east it blows to the west
+
+
+def test_the_loop_is_the_records_own_path():
+    record = landed()
+    _, above, _ = views(record)
+    scale = float(next(one for one in above.iter(f"{SVG}rect") if one.get("class") == "pad").get("width")) / 3.0
+    moving = next(one for one in above.iter(f"{SVG}g") if one.get("class") == "moving vehicle")
+    way = moving.find(f"{SVG}animateTransform")
+    assert way.get("dur") == "5s"
+    drawn = floats(way.get("values")).reshape(FRAMES, 2)
+    touch_s, truth = record.manifest["scores"]["touchdown"]["contact"]["t_s"], record.tables["truth"]
+    last = np.searchsorted(truth["t_s"], min(touch_s + 1.5, truth["t_s"][-1]))
+    high_s = truth["t_s"][(-truth["pos_d_m"] > 2.0) & (truth["t_s"] < touch_s)][-1]
+    first = np.searchsorted(truth["t_s"], min(high_s, touch_s - 8.0))
+    moved = (drawn[-1] - drawn[0]) / scale
+    expected = [truth[name][last] - truth[name][first] for name in ("pos_e_m", "pos_n_m")]
+    assert moved == pytest.approx([expected[0], -expected[1]], abs=0.02)
+
+
+def test_many_flights_give_the_ring_and_their_dots():
+    assert not [one for view in views(landed()) for one in view.iter() if one.get("class") == "ring"]
+    many = {"flights": 48, "r95_m": 0.5, "north_m": [0.1, 0.2, -0.3], "east_m": [0.0, 0.1, 0.2]}
+    close = views(landed(many=many))[2]
+    ring = next(one for one in close.iter(f"{SVG}circle") if one.get("class") == "ring")
+    dots = [one for one in close.iter(f"{SVG}circle") if one.get("class") == "other"]
+    centre = np.array([float(ring.get("cx")), float(ring.get("cy"))])
+    at = np.array([[float(dot.get("cx")), float(dot.get("cy"))] for dot in dots]) - centre
+    assert 0.5 * at / float(ring.get("r")) == pytest.approx(np.array([[0.0, -0.1], [0.1, -0.2], [0.2, 0.3]]), abs=0.003)
+    assert "R95 0.500 m of 48 flights" in "".join(close.itertext())
+
+
+def test_the_page_begins_with_it_and_does_without_where_nothing_landed():
+    page = render(landed())
+    assert page.index('class="landing"') < page.index('class="tiles"')
+    assert landing_picture(flight("takeoff")) is None
+    assert 'class="landing"' not in render(flight("takeoff"))
+    for contact in ({}, {"t_s": 20.0, "distance_m": float("nan")}, {"t_s": 20.0, "distance_m": "far"}):
+        record = landed()
+        record.manifest["scores"]["touchdown"]["contact"] = contact
+        assert landing_picture(record) is None
+
+
+def test_alone_it_brings_its_colours_and_its_quadrotor():
+    record = landed()
+    record.manifest["parameters"]["vehicle"] = {
+        "frame.arm_m": 0.225,
+        "frame.rotor_count": 4,
+        "propeller.radius_m": 0.127,
+    }
+    picture = landing_picture(record, alone=True)
+    assert "prefers-color-scheme:dark" in picture.svg
+    assert "var(--truth)" in picture.svg
+    assert "--truth:#" in picture.svg
+    _, above, _ = views(record, alone=True)
+    still = next(one for one in above.iter(f"{SVG}g") if one.get("class") == "still vehicle")
+    assert len(still.findall(f"{SVG}circle")) == 4

@@ -19,9 +19,9 @@ from flownav.estimation.states import ATTITUDE, GYRO_BIAS, POSITION, QUATERNION,
 from flownav.live import writing
 from flownav.live.answers import LONGEST_AHEAD_S, estimate_of, quality_of, why_withheld
 from flownav.live.filtering import ROOM
-from flownav.live.hearing import Origin
 from flownav.live.horizon import PATIENT_WINDOWS, WINDOW_S, Lags
 from flownav.live.options import Limits
+from flownav.live.origin import Origin
 from flownav.live.vehicle_clock import COARSE_S, FRESH_S, VehicleClock
 from flownav.live.vehicle_clock import WINDOW_S as LEADS_S
 from flownav.live.writing import HEAD_EVERY_S, LOCK_WAIT_S, SYNC_S, Writer, claim, is_locked, journal_of

@@ -7,8 +7,8 @@ import math
 
 import pytest
 
-from flownav.live.hearing import AGREEMENTS, FAR_M, STEP_M, Origin
 from flownav.live.options import Options
+from flownav.live.origin import AGREEMENTS, FAR_M, STEP_M, Origin
 from flownav.logs.mavlink.position_messages import local_position_m
 from live_ends import METRES_A_DEGREE, ORIGIN, Hover, Wire, hovering
 

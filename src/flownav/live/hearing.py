@@ -1,11 +1,6 @@
-"""From a vehicle's messages to readings that wait at the horizon: their time, their source, their age, their news.
+"""From a vehicle's messages to readings that wait at the horizon: their time, their source, their age, their news."""
 
-And where the local frames begin: the navigator's, which never moves, and the autopilot's, which it may set late.
-"""
-
-import math
 from collections import Counter, deque
-from typing import Any
 
 from flownav.core.frames import Vector
 from flownav.core.measurement import Measurement, Sensor
@@ -13,24 +8,18 @@ from flownav.live.filtering import FLOW, handed_over
 from flownav.live.horizon import LATE, Lags, Serving, Source, Sources
 from flownav.live.inertial import Inertial
 from flownav.live.options import Options
+from flownav.live.origin import Origin
 from flownav.live.reception import Vehicle, sender_of
 from flownav.live.repeats import CONTENT, Repeats
 from flownav.live.vehicle_clock import VehicleClock
 from flownav.logs.mavlink.converted import Context, Dropped, Pose
 from flownav.logs.mavlink.framing import ARDUPILOT, PX4, Message
 from flownav.logs.mavlink.messages import instance_of, measurements
-from flownav.logs.mavlink.position_messages import LEAST_FIX, fix_deg_m, local_position_m
+from flownav.logs.mavlink.position_messages import LEAST_FIX, fix_deg_m
 from flownav.navigation import waiting
 from flownav.navigation.feed import SLOWEST_IMU_HZ
 from flownav.navigation.rings import Rings
 
-Geodetic = tuple[float, float, float]  # latitude, longitude [deg], altitude [m]
-FAR_M = 1000.0  # of an origin from the first fix that is believed without asking where the vehicle is in it: chosen
-STEP_M = 10.0  # of an origin, once an estimate was sent, likewise: chosen, what GPS and an autopilot may differ by
-AGREEMENTS, FITS = 3, 0.5  # so often in a row, and by so much better than the other: chosen
-FARTHEST_M = 50_000.0  # from the vehicle, of an origin that can be (ArduPilot's own limit for home and origin)
-HIGHEST_M = 5_000.0  # up or down: chosen
-LEAST_MOVE_M = 0.01  # the tick of a latitude of 1e-7 deg
 LONGEST_EXPOSURE_S = 0.2  # chosen: two periods of a PX4FLOW at 9.5 Hz; a longer step is a gap
 GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
 REPEATED = "repeated"
@@ -40,131 +29,6 @@ UNBIASED = "SCALED_IMU"
 LEAST_UNBIASED = 25  # readings by which its rate is known: chosen
 MEASURED_MARGIN_S = 0.02  # beyond a measured lag; batches of 0.2 s lose nothing (test_live_recordings)
 NAN = float("nan")
-
-
-class Origin:
-    """The origin of the navigator's frame, and where that lies in the autopilot's.
-
-    The navigator's is what the autopilot told before the first fix, else the first fix; positions that it was fed are
-    about it, so it stays. An autopilot that sets its own later, or another, moves what is sent by the difference, which
-    is a jump of the estimate (`moves` counts them). One that no vehicle of this place can have is refused (`refused`).
-
-    One message is one witness: an origin far from the first fix, or another one once an estimate was sent, is doubted
-    (`doubted`). The autopilot's own position (LOCAL_POSITION_NED) is about its origin, so that with it and the fixes
-    one of the two fits: the doubted one, or the one that was.
-    """
-
-    def __init__(self) -> None:
-        self.navigator_deg_m: Geodetic | None = None
-        self.offset_ned_m: Vector = (0.0, 0.0, 0.0)  # of the navigator's origin in the autopilot's frame
-        self.moves = self.refused = 0
-        self.doubted: Geodetic | None = None
-        self._agreed = 0  # positions in a row that fit the doubted one, less than 0 those that fit the other
-        self._told: Geodetic | None = None
-        self._fix: Geodetic | None = None
-
-    @property
-    def about_deg_m(self) -> Geodetic | None:
-        """Where on earth the vehicle is, as far as anybody said."""
-        return self.navigator_deg_m or self._told
-
-    def told(self, place: Geodetic, *, settled: bool = False) -> str:
-        """GPS_GLOBAL_ORIGIN: "" where nothing changes, `moved`, `refused`, `doubted`. settled: an estimate was sent."""
-        if not can_be(place, self._fix):
-            self.refused += 1
-            return "refused"
-        if self._is_doubtful(place, settled=settled):
-            self._agreed = 0 if place != self.doubted else self._agreed
-            self.doubted = place
-            return "doubted"
-        self._told, self.doubted = place, None
-        if self.navigator_deg_m is None:
-            return ""
-        return self._laid(place)
-
-    def fixed(self, place: Geodetic, here_ned_m: Vector | None = None) -> str:
-        """A GPS fix: "", `moved`, `doubted` or `refused`. The first one judges what was told before it, and is the
-        origin where nothing that can be was.
-
-        here_ned_m: where a navigator that began without GPS is by now; the fix is there, and the origin behind it.
-        """
-        self._fix = place
-        if self.navigator_deg_m is not None:
-            return ""
-        known = self._told is not None and can_be(self._told, place)
-        far = self._told is not None and math.dist(local_position_m(self._told, place), (0.0, 0.0, 0.0)) > FAR_M
-        if known and here_ned_m is None and not far:
-            self.navigator_deg_m = self._told
-            return ""
-        self.navigator_deg_m = place if here_ned_m is None else _behind(place, here_ned_m)
-        if self._told is None:
-            return ""
-        if known and not far:
-            return self._laid(self._told)
-        self.doubted, self._told = self._told if known else None, None
-        self.refused += not known
-        return "doubted" if known else "refused"
-
-    def _is_doubtful(self, place: Geodetic, *, settled: bool) -> bool:
-        """Whether somebody else has to say the same before it is believed."""
-        used = self._told or self.navigator_deg_m
-        if self.navigator_deg_m is None or used is None:
-            return False
-        return math.dist(local_position_m(place, used), (0.0, 0.0, 0.0)) > (STEP_M if settled else FAR_M)
-
-    def stands(self, pos_ned_m: Vector) -> str:
-        """Where the autopilot is about its own origin, by itself: "" where it decides nothing, `moved` or `refused`."""
-        used, fix = self._told or self.navigator_deg_m, self._fix
-        if self.doubted is None or used is None or fix is None:
-            return ""
-        new_m, old_m = (math.dist(local_position_m(fix, origin), pos_ned_m) for origin in (self.doubted, used))
-        fits = int(new_m < FITS * old_m) - int(old_m < FITS * new_m)
-        self._agreed = self._agreed + fits if fits * self._agreed >= 0 and fits else fits
-        if abs(self._agreed) < AGREEMENTS:
-            return ""
-        place, believed = self.doubted, self._agreed > 0
-        self.doubted, self._agreed = None, 0
-        if not believed:
-            self.refused += 1
-            return "refused"
-        self._told = place
-        return self._laid(place)
-
-    def as_facts(self) -> dict[str, Any]:
-        """What is told of it as JSON."""
-        facts = {"offset_ned_m": list(self.offset_ned_m), "moves": self.moves, "refused": self.refused}
-        return facts | {"doubted": list(self.doubted) if self.doubted else None}
-
-    def _laid(self, told: Geodetic) -> str:
-        """North and east of the earth's shape, down the difference of altitudes, as autopilots reckon."""
-        assert self.navigator_deg_m is not None
-        north_m, east_m, _ = local_position_m(self.navigator_deg_m, told)
-        offset_ned_m = north_m, east_m, told[2] - self.navigator_deg_m[2]
-        if math.dist(offset_ned_m, self.offset_ned_m) < LEAST_MOVE_M:
-            return ""
-        self.offset_ned_m = offset_ned_m
-        self.moves += 1
-        return "moved"
-
-
-def _behind(place: Geodetic, here_ned_m: Vector) -> Geodetic:
-    """The origin of which a place lies at a position of the local frame."""
-    import pymap3d
-
-    north_m, east_m, down_m = here_ned_m
-    latitude, longitude, altitude_m = pymap3d.ned2geodetic(-north_m, -east_m, -down_m, *place)
-    return float(latitude), float(longitude), float(altitude_m)
-
-
-def can_be(place: Geodetic, fix: Geodetic | None) -> bool:
-    """Whether a place is on the earth, is not the 0, 0 of nothing known, and lies in reach of a fix, if any."""
-    latitude, longitude, altitude_m = place
-    if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0 and (latitude or longitude)):
-        return False
-    if fix is None:
-        return True
-    north_m, east_m, _ = local_position_m(place, fix)
-    return math.hypot(north_m, east_m) <= FARTHEST_M and abs(altitude_m - fix[2]) <= HIGHEST_M
 
 
 class Hearing:

@@ -43,8 +43,8 @@ class LiveProcess:
         return self
 
     def __exit__(self, *raised: object) -> None:
-        self.process.kill()
-        self.process.wait()
+        with self.process:  # waits, and closes its pipes: left open by a test that failed, they fail the next
+            self.process.kill()
         self.link.close()
 
     def fly(self, more: int, within_s: float = HUNG_S, beside: Callable[[], object] = lambda: None) -> LiveProcess:

@@ -127,16 +127,16 @@ def test_twenty_thousand_messages_a_second_take_nothing_but_time(tmp_path, kind)
 
         live.fly(150)
         live.heard.clear()
-        until_s = last_s = time.monotonic()
-        until_s += 5.0
-        while time.monotonic() < until_s:
+        begun_s = last_s = time.monotonic()
+        while sent < 60_000 or time.monotonic() - begun_s < 5.0:  # a machine that has no time takes longer
+            assert time.monotonic() - begun_s < HUNG_S
             live.fly(1, beside=flood)
-        assert sent > 50_000
-        flooded = len(live.heard)
+        flooded, took_s = len(live.heard), time.monotonic() - begun_s
         live.fly(100)
-        print(f"{kind}: {sent} in 5 s, {flooded} estimates, {max(age_s for age_s, _ in live.heard):.2f} s old at most")
+        oldest_s = max(age_s for age_s, _ in live.heard)
+        print(f"{kind}: {sent} in {took_s:.1f} s, {flooded} estimates, {oldest_s:.2f} s old at most")
         assert max(math.hypot(said.x, said.y) for _, said in live.heard) < 0.5
-        assert max(age_s for age_s, _ in live.heard) < 2.0
+        assert oldest_s < 2.0
         stamps_us = [said.time_usec for _, said in live.heard]
         assert stamps_us == sorted(stamps_us)
         output, errors = live.end(signal.SIGINT)

@@ -58,11 +58,10 @@ def test_bench_serial_lines() -> None:
     for baud in BAUDS:
         options = options_of(setup, baud)
         for name, chosen in ((str(baud), options), ("  before", replace(options, capacity_bytes_s=None))):
-            flown = fly_over(baud, SimulatedVehicle(log), DURATION_S, chosen)
+            vehicle = SimulatedVehicle(log)
+            flown = fly_over(baud, vehicle, DURATION_S, chosen)
             print(row(name, baud, flown), flush=True)
-            if chosen is options:
-                assert flown.lost / (DURATION_S - SETTLED_S) < 1.0
-                assert flown.error_m < 2.0
+            assert not vehicle.damage  # how much is lost and how true it is are tests/live/test_live_serial.py's
 
 
 SLOW = {"HIGHRES_IMU": (105, 0.0), "OPTICAL_FLOW_RAD": (106, 15.0), "DISTANCE_SENSOR": (132, 10.0),

@@ -223,13 +223,14 @@ class Flight:
         self.session.vehicle_now_s = lambda: BOOT_S + clock() - self.began_s
         self._backlog: list[int] = []
         self._settled: tuple[int, int, int] | None = None
+        self.lasted_s = 0.0
 
     def counts(self) -> tuple[int, int, int]:
         """Bytes received and written so far, and frames dropped."""
         return self.link.received, self.link.written, self.uart.dropped
 
-    def fly(self, seconds: float) -> None:
-        """Until so many seconds have passed."""
+    def fly(self, seconds: float, estimates: int = 0) -> None:
+        """Until so many seconds have passed and so many estimates have arrived, or the vehicle's flight is over."""
 
         def stop() -> bool:
             now_s = self.clock() - self.began_s
@@ -237,16 +238,22 @@ class Flight:
                 self._settled, self.session.watching = self.counts(), True
             if self._settled is not None:
                 self._backlog.append(self.uart.backlog)
-            return now_s >= seconds
+            self.lasted_s = now_s - SETTLED_S
+            return now_s >= seconds and (len(self.arrived()) >= estimates or self.vehicle.finished)
 
         run_session(self.session, self.link, Latency(), stop, clock=self.clock)
 
-    def flown(self, baud: int, seconds: float) -> Flown:
+    def arrived(self) -> list[tuple[float, Any]]:
+        """The estimates that the vehicle received since the line has settled, and when."""
+        received = list(self.vehicle.received)
+        return [(t_s, m) for t_s, m in received if m.msgname == "ODOMETRY" and t_s > SETTLED_S]
+
+    def flown(self, baud: int) -> Flown:
         """What became of it."""
-        vehicle, session, lasted_s = self.vehicle, self.session, seconds - SETTLED_S
+        vehicle, session, lasted_s = self.vehicle, self.session, self.lasted_s
         assert self._settled is not None
         received, written, dropped = (now - then for now, then in zip(self.counts(), self._settled, strict=True))
-        told = [(t_s, m) for t_s, m in vehicle.received if m.msgname == "ODOMETRY" and t_s > SETTLED_S]
+        told = self.arrived()
         truths = [vehicle.truth_at(m.time_usec * 1e-6 - BOOT_S) for _, m in told]
         errors = [np.array([m.x, m.y]) - position[:2] for (_, m), (position, _) in zip(told, truths, strict=True)]
         away = np.array(errors).reshape(-1, 2)
@@ -279,11 +286,11 @@ def fly_virtually(baud: int, vehicle: SimulatedVehicle, seconds: float, options:
         flight.fly(seconds)
     finally:
         link.close()
-    return flight.flown(baud, seconds)
+    return flight.flown(baud)
 
 
-def fly_over(baud: int, vehicle: SimulatedVehicle, seconds: float, options: Options) -> Flown:
-    """A simulated vehicle and a session at the two ends of a line, in real time."""
+def fly_over(baud: int, vehicle: SimulatedVehicle, seconds: float, options: Options, estimates: int = 0) -> Flown:
+    """A simulated vehicle and a session at the two ends of a line, in real time, as `Flight.fly` ends it."""
     uart = RealUart(baud)
     link = open_link(f"serial:{uart.device}:{baud}")
     flight = Flight(vehicle, uart, link, options, time.monotonic)
@@ -291,13 +298,13 @@ def fly_over(baud: int, vehicle: SimulatedVehicle, seconds: float, options: Opti
     telling = threading.Thread(target=run_vehicle, args=(vehicle, uart, 1.0, ended.is_set))
     telling.start()
     try:
-        flight.fly(seconds)
+        flight.fly(seconds, estimates)
     finally:
         ended.set()
         telling.join()
         link.close()
         uart.close()
-    return flight.flown(baud, seconds)
+    return flight.flown(baud)
 
 
 def options_of(setup: Any, baud: int) -> Options:

@@ -223,7 +223,7 @@ def test_a_peer_that_is_gone_does_not_stop_us_and_is_found_again():
             link.read()
             taken_s.append(time.monotonic() - before_s)
             time.sleep(0.005)
-        assert sorted(taken_s)[-5] < 0.2  # five calls are begun
+        assert sorted(taken_s)[-5] < 0.5  # five calls are begun; waited for, each took a second
         assert link.counts["reconnected"] == 0
         server.settimeout(0.001)
         waiting = []

@@ -28,11 +28,8 @@ def flight():
 
 
 def assert_it_fits(flown, baud):
-    assert not flown.damaged
     assert flown.received_bytes_s < 0.85 * baud / 10
     assert flown.written_bytes_s < 0.85 * baud / 10
-    assert flown.error_m < 2.0
-    assert flown.velocity_error_m_s < 0.25
 
 
 @pytest.mark.parametrize("baud", BAUDS)
@@ -40,6 +37,9 @@ def test_a_line_carries_what_is_asked_of_it(flight, baud):
     log, setup = flight
     flown = fly_virtually(baud, SimulatedVehicle(log), FLOWN_S, options_of(setup, baud))
     assert_it_fits(flown, baud)
+    assert not flown.damaged
+    assert flown.error_m < 2.0
+    assert flown.velocity_error_m_s < 0.25
     assert flown.session.reason == ""
     assert flown.lost == 0
     assert flown.estimate_hz > 0.9 * min(50.0, plan(0, baud / 10, "odometry").estimate_hz)
@@ -60,8 +60,11 @@ def test_a_slow_line_that_everything_is_asked_of_loses_frames_and_grows_old(flig
 @pytest.mark.real_time
 @pytest.mark.parametrize("baud", BAUDS)
 def test_a_real_line_carries_what_is_asked_of_it(flight, baud):
-    """Over a pseudo-terminal. What a loaded machine loses is the benchmark's."""
+    """Over a pseudo-terminal: no frame is torn, estimates come. What a loaded machine loses is the benchmark's."""
     log, setup = flight
-    flown = fly_over(baud, SimulatedVehicle(log), FLOWN_S, options_of(setup, baud))
+    vehicle = SimulatedVehicle(log)
+    flown = fly_over(baud, vehicle, FLOWN_S, options_of(setup, baud), estimates=20)
     assert_it_fits(flown, baud)
-    assert flown.estimate_hz > 0.2 * min(50.0, plan(0, baud / 10, "odometry").estimate_hz)
+    assert len(flown.estimate_age_s) >= 20
+    assert not vehicle.damage
+    assert set(flown.damaged) <= {"lost"}

@@ -26,4 +26,4 @@ print(rss() - before)
 @pytest.mark.skipif(sys.platform != "linux", reason="of glibc")
 def test_free_memory_goes_back():
     done = subprocess.run([sys.executable, "-c", SCRIPT.format(early=True)], check=True, capture_output=True, text=True)
-    assert int(done.stdout) < 20_000
+    assert int(done.stdout) < 10_000  # none is kept; without it, 20 000

@@ -11,7 +11,7 @@ demo: $(VENV)/.ready
 	$(BIN)/flownav fly --out out/sortie.fnr --force
 
 test: $(VENV)/.ready-test
-	PYTHONHASHSEED=0 $(BIN)/python -m pytest -m "not slow and not real_time" -n 2 --dist loadfile --no-loadscope-reorder -p no:benchmark
+	PYTHONHASHSEED=0 $(BIN)/python -m pytest -m "not slow and not real_time" -n 2 --dist loadfile --no-loadscope-reorder -p no:benchmark --durations=25 --durations-min=5
 
 test-real-time: $(VENV)/.ready-test
 	$(BIN)/python -m pytest -m real_time -p no:benchmark

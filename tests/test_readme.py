@@ -43,7 +43,7 @@ def test_make_knows_what_it_is_told_to_make():
 def test_ci_makes_what_the_readme_names():
     named = set(re.findall(r"^make ([a-z-]+)", README, re.M))
     assert named
-    assert named <= set(re.findall(r"^make ([a-z-]+)", CI, re.M))
+    assert named <= {word for line in re.findall(r"^make (.*)", CI, re.M) for word in line.split()}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

@@ -153,6 +153,20 @@ def test_one_whose_motors_run_stands_where_its_range_is_steady_at_contact_and_it
     assert judge_standing(LOUD, seen, contact_m) == does
 
 
+@pytest.mark.parametrize(("seen", "does"), [
+    (ranged(0.014, 0.020)._replace(flows=0.0), SHAKEN),  # flow begins as it lifts off
+    (ranged(0.014, 0.049)._replace(flows=0.0), MOVES),  # it rises
+    (ranged(0.014, 0.020)._replace(flow_u_m_s=5.0), SHAKEN),  # a lens out of focus reads 0.5 m/s
+    (ranged(0.045, 0.049)._replace(flow_v_m_s=-5.0), SHAKEN),
+    (ranged(0.045, 0.051)._replace(flow_v_m_s=-5.0), MOVES),
+    (ranged(0.045, 0.051)._replace(flows=0.0), MOVES),
+    (ranged(0.014, 0.020)._replace(gps_m_s=1.1), MOVES),
+])  # fmt: skip
+def test_nearer_than_any_lens_focuses_the_range_alone_tells_that_a_vehicle_stands(seen, does):
+    """Ten flights of a small drone whose flow was logged from lift-off on began with a velocity known to 2 m/s."""
+    assert judge_standing(LOUD, seen, NAN) == does
+
+
 @pytest.mark.parametrize("seen", [
     ranged(2.0, 2.0), GROUNDED._replace(gps_m_s=1.1), GROUNDED._replace(flow_u_m_s=3.1),
     UNSEEN._replace(gps_m_s=5.0), ranged(CONTACT_M + 0.01, CONTACT_M + 0.01),

@@ -24,12 +24,14 @@ def imu_serves(streams: dict[Sensor, Stream]) -> bool:
 
 
 def heading_source(streams: dict[Sensor, Stream]) -> float:
-    """Where headings come from; none where there is no earth frame to refer them to, but what is told as a heading."""
+    """Where headings come from: a magnetometer's north is the frame's, with GPS or without; an attitude's heading is
+    one only in a frame of the earth.
+    """
     told = FROM_YAW if Sensor.YAW in streams and len(streams[Sensor.YAW]) else NO_HEADING
-    if Sensor.GPS_POSITION not in streams and Sensor.GPS_VELOCITY not in streams:
-        return told
     if Sensor.MAG in streams and len(streams[Sensor.MAG]):
         return FROM_MAG
+    if Sensor.GPS_POSITION not in streams and Sensor.GPS_VELOCITY not in streams:
+        return told
     return FROM_ATTITUDE if Sensor.ATTITUDE in streams else told
 
 

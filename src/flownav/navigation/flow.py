@@ -9,9 +9,17 @@ from flownav.core.measurement import Sensor
 from flownav.estimation.covariance import consider
 from flownav.estimation.laws.flow import body_velocity, flow_rate
 from flownav.estimation.named import VelocityNed
-from flownav.estimation.states import ATTITUDE, COMPASS, GROUND, GYRO_BIAS, INS_ERROR, POSITION, VELOCITY
+from flownav.estimation.states import ATTITUDE, COMPASS, FLOW_SCALE, GROUND, GYRO_BIAS, INS_ERROR, POSITION, VELOCITY
 from flownav.navigation.fault_signs import sign_flow
-from flownav.navigation.flow_judge import gyro_share, hold_back, judge_look, see_ground, see_turning, sum_looks
+from flownav.navigation.flow_judge import (
+    gyro_share,
+    hold_back,
+    judge_look,
+    judge_scale,
+    see_ground,
+    see_turning,
+    sum_looks,
+)
 from flownav.navigation.flow_noise import (
     DOUBTED_RATIO,
     LONGEST_STEP_S,
@@ -29,7 +37,7 @@ from flownav.navigation.flow_noise import (
     wrong_since,
 )
 from flownav.navigation.lagged_flow import observe_lagged
-from flownav.navigation.memory import RANGE_MISSING, holds
+from flownav.navigation.memory import RANGE_MISSING, SCALE_UNTOLD, holds
 from flownav.navigation.offers import conclude, note_aid
 from flownav.navigation.packed import load_flow_settings
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT, component_of
@@ -202,6 +210,7 @@ def take_flow(
         see_turning(work, lanes, t_s, gyro_is_imu, s)
     judge_look(work, lanes, angular, s)
     hold_back(work, lanes, t_s)
+    judge_scale(work, lanes, t_s)
     consider_others(work, lanes)
     watch_flow(work, lanes, angular)
     for component in range(2 if angular or lag is not None else 3):
@@ -225,10 +234,12 @@ def take_flow(
 @equation
 def consider_others(work: Work, lanes: Lanes) -> None:
     """What flow depends on and is no judge of: over a step of the ground it would move the height, and by accelerations
-    that err it would turn the heading. Where GPS tells the velocity too, that is what corrects them.
+    that err it would turn the heading; its scale is learnt where GPS holds (`judge_scale`).
+    Where GPS tells the velocity too, that is what corrects the rest.
     """
     consider(work, lanes, POSITION + 2, RANGE_MISSING)
     consider(work, lanes, GROUND, RANGE_MISSING)
+    consider(work, lanes, FLOW_SCALE, SCALE_UNTOLD)
     consider(work, lanes, ATTITUDE + 2)
     consider(work, lanes, GYRO_BIAS + 2)
     consider(work, lanes, INS_ERROR + 2)

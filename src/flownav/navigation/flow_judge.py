@@ -37,6 +37,7 @@ from flownav.navigation.verdicts import Biases, GroundBelow, HeldBack, on_lanes
 
 with_turning = replacing(Look, "turning_x", "turning_y")
 with_reason = replacing(Look, "reason")
+with_scale = replacing(Look, "unscaled")
 with_values = replacing(Reading, "value_0", "value_1", "value_2", "value_3", "value_4", "value_5", "quality")
 with_arrival = replacing(Reading, "arrived")
 with_gyro = replacing(FlowMemory, "bias_x", "bias_y", "bias_count")
@@ -165,6 +166,14 @@ def judge_look(
     near = look.known > 0.0 and look.range_m * look.upright <= s.flow_min_height_m  # `lens_range` is at least 0.05
     reason = NEAR_GROUND if reason == FUSED and near else reason
     return with_reason(look, reason=NO_HEADING if reason == FUSED and heading.sought > 0.0 else reason)
+
+
+@on_lanes
+def judge_scale(look: Look, gps: GpsMemory, m: FlowMemory, *, t_s: float) -> Look:
+    """A flow's scale is learnt against GPS alone, and not of a flow that is doubted: without either, an error of the
+    motion or noise passes for a scale, which then lasts.
+    """
+    return with_scale(look, unscaled=0.0 if holds(gps, t_s) and m.doubted == 0.0 else 1.0)
 
 
 @on_lanes

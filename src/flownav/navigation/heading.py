@@ -6,21 +6,25 @@ import numpy as np
 
 from flownav.core.compile import Lanes, Work, arctan2, equation, larger, procedure, replacing
 from flownav.core.frames import rotation_from_quaternion, to_earth
+from flownav.estimation.covariance import expect, states_of
 from flownav.estimation.hypotheses import HEADING_OFF, sign_all
 from flownav.estimation.laws.attitude import heading
 from flownav.estimation.named import Attitude
-from flownav.navigation.offers import conclude
+from flownav.estimation.states import ATTITUDE, INS_ERROR
+from flownav.navigation.offers import conclude, offer_what_is_sound
 from flownav.navigation.packed import load_attitude_settings
-from flownav.navigation.reasons import FUSED, NO_HEADING, SILENT, is_heard, usable_in_flight
+from flownav.navigation.reasons import FUSED, INNOVATION_GATE, NO_HEADING, SILENT, is_heard, usable_in_flight
 from flownav.navigation.records import HeadingMemory, Reading, StartMemory
 from flownav.navigation.tape import Output
 from flownav.navigation.told import FROM_YAW, AttitudeSettings, Equipment
-from flownav.navigation.verdicts import Offer, on_lanes
+from flownav.navigation.verdicts import Doubt, Fate, Noise, Offer, Tested, on_lanes
 
 LEAST_FIELD_GAUSS = 1e-3  # chosen: hundreds of times less than the level field but near the magnetic poles
 LEAST_STEP_S = 1e-3  # keeps a division finite
 
-with_time = replacing(HeadingMemory, "read_s")
+RECONSIDERED_S = 30.0  # chosen: three times as long as a vehicle passes by steel
+with_time = replacing(HeadingMemory, "read_s", "fused_rad2")
+with_refusal = replacing(HeadingMemory, "refused_s")
 with_field = replacing(HeadingMemory, "field_rad")
 
 
@@ -42,13 +46,47 @@ class HeadingVerdict(NamedTuple):
 def offered_heading(
     t_s: float, read_rad: float, stated: float, reason: int, m: HeadingMemory, s: AttitudeSettings
 ) -> HeadingVerdict:
-    """A heading with the variance that is stated, or modelled from how often it is read."""
+    """A heading with the variance that is stated, or that of one alone; `weigh_heading` knows how often it is read."""
     modelled = not np.isfinite(stated)
     refuted = reason == FUSED and m.refuted > 0.0
     verdict = NO_HEADING if refuted else reason
+    after = with_time(
+        m,
+        read_s=t_s if modelled and verdict != SILENT else m.read_s,
+        fused_rad2=heading_variance(t_s, m, s) if modelled else stated,
+    )
     return HeadingVerdict(
-        with_time(m, read_s=t_s if modelled and verdict != SILENT else m.read_s),
-        Offer(read_rad, heading_variance(t_s, m, s) if modelled else stated, verdict),
+        after, Offer(read_rad, s.heading_noise_rad * s.heading_noise_rad if modelled else stated, verdict)
+    )
+
+
+class Weighed(NamedTuple):
+    """A heading that was held against its gate: its fate, the variance to fuse it with, and what is doubted."""
+
+    fate: Fate
+    noise: Noise
+    heading: HeadingMemory
+    doubts: tuple[Doubt, Doubt]
+
+
+@on_lanes
+def weigh_heading(fate: Fate, tested: Tested, m: HeadingMemory, *, t_s: float, gate_sigma: float) -> Weighed:
+    """The gate is that of one heading, however often it is read: an error that lasts lets none pass that is far off.
+
+    Headings that are refused for RECONSIDERED_S contradict the filter's heading and what is known of their own lasting
+    error; which of both is wrong they cannot tell, so both are doubted by the contradiction.
+    """
+    sound = fate.reason == FUSED
+    beyond = sound and tested.innovation * tested.innovation > gate_sigma * gate_sigma * tested.total
+    since_s = m.refused_s if np.isfinite(m.refused_s) else t_s
+    lasts = beyond and t_s - since_s >= RECONSIDERED_S
+    doubt = tested.innovation * tested.innovation if lasts else 0.0
+    refused_s = (np.nan if lasts else since_s) if beyond else (np.nan if sound else m.refused_s)
+    return Weighed(
+        Fate(INNOVATION_GATE if beyond else fate.reason),
+        Noise(m.fused_rad2),
+        with_refusal(m, refused_s=refused_s),
+        (Doubt(ATTITUDE + 2, doubt), Doubt(INS_ERROR + 2, doubt)),
     )
 
 
@@ -100,6 +138,9 @@ def conclude_heading(work: Work, lanes: Lanes, t_s: float, sensor: int, s: Attit
     """The heading that was judged, tested and fused."""
     heading(work, lanes, 0)
     sign_all(work, lanes, HEADING_OFF, 1.0)
+    offer_what_is_sound(work, lanes)
+    expect(work, lanes, states_of(lanes), True)
+    weigh_heading(work, lanes, t_s, s.gate_sigma)
     conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
 
 

@@ -20,7 +20,13 @@ from flownav.navigation.tape import IMU_LOST
 from flownav.navigation.told import ImuSettings
 from flownav.navigation.trust import AccelFactors
 from flownav.navigation.verdicts import AppliedMotion, Event, Force, MotionNoise, on_lanes
-from flownav.navigation.vibration import followed_accel_power, followed_gyro_power, followed_vibration, with_reading
+from flownav.navigation.vibration import (
+    followed_accel_power,
+    followed_blocks,
+    followed_gyro_power,
+    followed_vibration,
+    with_reading,
+)
 
 LEAST_STEP_S = 0.002  # chosen: half a period at 250 Hz; what is owed over less would be an acceleration of its own
 SWING_S = 0.3  # chosen: 0.6 is as good, with none all three velocities are too sure (test_wind_from_all_sides)
@@ -154,7 +160,7 @@ def judge_motion(
     heard: an inertial reading is at hand; where none ever is, none stands for the step. After a gap it knows nothing of
     the gap, which is coasted. Where no time passes there is no gap.
     """
-    m, spent, owed, before = memory
+    m, blocks, spent, owed, before = memory
     started = start.started > 0.0
     period_s = t_s - m.read_s
     fresh = period_s <= s.imu_stale_s
@@ -172,7 +178,7 @@ def judge_motion(
     y = paid(between[4], held[4], spent.accel_y, owed.accel_y, step_s, period_s, now, moving)
     z = paid(between[5], held[5], spent.accel_z, owed.accel_z, step_s, period_s, now, moving)
     least_down = s.accel_noise_m_s2_rt_hz * s.accel_noise_down_share
-    told = told_noise(s.accel_noise_m_s2_rt_hz, m.accel_power, tones.noise_power, s)
+    told = told_noise(s.accel_noise_m_s2_rt_hz, larger(m.accel_power, blocks.power), tones.noise_power, s)
     told_down = told_noise(least_down, m.accel_power, tones.noise_power, s)
     accel = doubt.level * told if moving else s.coasting_accel_m_s2_rt_hz
     accel_down = larger(doubt.level, doubt.down) * told_down if moving else s.coasting_accel_m_s2_rt_hz
@@ -190,6 +196,7 @@ def judge_motion(
                 gyro_power=followed_gyro_power(reading, m, period_s) if now and fresh else m.gyro_power,
                 gap=1.0 if step_s > 0.0 and started and not moving else m.gap,
             ),
+            followed_blocks(reading, t_s, blocks) if now and started else blocks,
             SpentMotion(p.spent, q.spent, r.spent, x.spent, y.spent, z.spent),
             OwedMotion(p.owed, q.owed, r.owed, x.owed, y.owed, z.owed),
             tones,

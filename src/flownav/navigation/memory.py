@@ -24,6 +24,7 @@ from flownav.navigation.motion_records import (
     BridgeMemory,
     CourseMemory,
     DriftMemory,
+    ForceBlocks,
     ImuMemory,
     ImuWindow,
     MotionStep,
@@ -99,10 +100,11 @@ OBSERVATION = MEMORY.take(1)
 MEMORY.keep(Look)
 MEMORY.keep(FlowInnovation, 3, "component")
 RANGE_MISSING = MEMORY.row(Look, "unranged")
+SCALE_UNTOLD = MEMORY.row(Look, "unscaled")
 SCALE_DOUBT = MEMORY.keep(ScaleDoubt)
 MEMORY.keep(SteadyForce)
 MEMORY.keep(DriftMemory)
-for _record in (MotionStep, SpentMotion, OwedMotion, ToneMemory, FlowSignMemory, SuspicionMemory, FlowSum):
+for _record in (ForceBlocks, MotionStep, SpentMotion, OwedMotion, ToneMemory, FlowSignMemory, SuspicionMemory, FlowSum):
     MEMORY.keep(_record)
 PROTECTION = MEMORY.keep(Levels)  # horizontal and vertical
 SUSPECTED = MEMORY.row(SuspicionMemory, "suspected")

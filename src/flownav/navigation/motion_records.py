@@ -232,10 +232,29 @@ class SteadyForce(NamedTuple):
     down_m_s2: float = 0.0
 
 
+class ForceBlocks(NamedTuple):
+    """Mean specific force along the level body axes [m/s2] over blocks of time: when the block began [s], how many
+    readings it has, their sum; the mean of the block before and how that differs from the one before it; how many
+    blocks are done, and the power density of what changes between their changes [(m/s2)^2/Hz].
+    """
+
+    since_s: float = 0.0
+    readings: float = 0.0
+    sum_x: float = 0.0
+    sum_y: float = 0.0
+    mean_x: float = 0.0
+    mean_y: float = 0.0
+    change_x: float = 0.0
+    change_y: float = 0.0
+    blocks: float = 0.0
+    power: float = 0.0
+
+
 class MotionMemory(NamedTuple):
     """All that is remembered of inertial readings from step to step."""
 
     imu: ImuMemory
+    blocks: ForceBlocks
     spent: SpentMotion
     owed: OwedMotion
     tones: ToneMemory

@@ -165,7 +165,8 @@ class Look(NamedTuple):
     """What the flow reading at hand saw: the vehicle's turning [rad/s]; the range from the lens to the ground along the
     boresight by the filter [m], and known: 1 where that is well known; R_33; unranged: 1 where no range tells the
     height of the flow now: none lately, or a disputed one, or strays; by how much the newest range disputes that height
-    [m]; and the verdict on the whole reading (`reasons`).
+    [m]; the verdict on the whole reading (`reasons`); and unscaled: 1 where nothing absolute is at hand that the flow's
+    scale could be learnt against.
     """
 
     turning_x: float = 0.0
@@ -176,18 +177,22 @@ class Look(NamedTuple):
     unranged: float = 0.0
     disputed_m: float = 0.0
     reason: float = 0.0
+    unscaled: float = 0.0
 
 
 class HeadingMemory(NamedTuple):
     """read_s: when a heading was read last; field_rad: direction of the level magnetic field in the filter's frame;
     refuted: 1 once what is read as heading was found to be wrong; sought: 1 while a heading that no sensor reads is to
-    be found from the course.
+    be found from the course; fused_rad2: the variance with which the heading at hand is fused [rad2];
+    refused_s: since when headings are refused, NaN where the last one passed its gate.
     """
 
     read_s: float = -inf
     field_rad: float = nan
     refuted: float = 0.0
     sought: float = 0.0
+    fused_rad2: float = nan
+    refused_s: float = nan
 
 
 class NoiseMemory(NamedTuple):

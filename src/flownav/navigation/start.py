@@ -203,7 +203,8 @@ def heading_sigma(read: bool, lost: bool, unknown: bool, field_rad: float, headi
     known = heading == NO_HEADING and not lost
     turned = DATUM_HEADING_RAD if known else (READ_HEADING_RAD if read else COMPASS_HEADING_RAD)
     turned = UNKNOWN_RAD if unknown else turned
-    return UNTOLD_HEADING_RAD if heading == FROM_YAW and not np.isfinite(field_rad) else turned
+    told = heading == FROM_YAW or (heading == FROM_MAG and not read)
+    return UNTOLD_HEADING_RAD if told and not np.isfinite(field_rad) else turned
 
 
 class Beginning(NamedTuple):

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.core.compile import clamp, equation, larger, replacing, smaller
+from flownav.core.compile import clamp, equation, larger, replacing, smaller, squared
 from flownav.estimation.states import ACCEL_BIAS, GROUND, POSITION, VELOCITY
-from flownav.navigation.motion_records import ImuMemory, MotionStep
+from flownav.navigation.motion_records import ForceBlocks, ImuMemory, MotionStep
 from flownav.navigation.records import Reading, StartMemory
 from flownav.navigation.tape import IMU_DOUBTED
 from flownav.navigation.told import ImuSettings
@@ -20,6 +20,7 @@ from flownav.navigation.verdicts import Biases, Doubt, Event, on_lanes
 
 # Chosen together: 3 m/s2 rectified at take-off leave the height within 0.3 m (test_vibration_at_take_off), 6 in half a
 # second within 5 m (test_hard_flights). None was varied alone.
+BLOCK_S, BLOCKS_FOLLOWED_S = 0.4, 4.0
 FOLLOWING_S = 1.0  # over which readings' scatter is followed (test_judges)
 DOUBT_M_S2 = 2.0  # of an accelerometer that the range contradicts
 DOUBT_LASTS_S = 60.0
@@ -67,6 +68,31 @@ def followed_accel_power(reading: Reading, m: ImuMemory, dt_s: float) -> float:
     x, y = reading.value_3 - m.accel_x - m.change_x, reading.value_4 - m.accel_y - m.change_y
     share = dt_s / (FOLLOWING_S + dt_s)
     return m.accel_power + share * ((x * x + y * y) * dt_s / 12.0 - m.accel_power)
+
+
+@equation
+def followed_blocks(reading: Reading, t_s: float, m: ForceBlocks) -> ForceBlocks:
+    """The mean level force over blocks of BLOCK_S with one reading more, and the noise that blocks show: how their
+    changes change has six times the variance of a block's mean (`followed_accel_power`, whose readings are blocks).
+
+    A unit that smooths shows none of its noise between two readings of 1 kHz, and shaking that comes and goes lasts
+    longer than one; a vehicle's own level force, which is drag, hardly changes its pace within a second.
+    """
+    summed = ForceBlocks(
+        t_s if m.readings == 0.0 else m.since_s, m.readings + 1.0, m.sum_x + reading.value_3, m.sum_y + reading.value_4,
+        m.mean_x, m.mean_y, m.change_x, m.change_y, m.blocks, m.power,
+    )  # fmt: skip
+    lasts_s = t_s - summed.since_s
+    x, y = summed.sum_x / summed.readings, summed.sum_y / summed.readings
+    change_x, change_y = x - m.mean_x, y - m.mean_y
+    square = squared(change_x - m.change_x) + squared(change_y - m.change_y)
+    share = larger(1.0 / (m.blocks - 1.0), BLOCK_S / BLOCKS_FOLLOWED_S) if m.blocks > 1.0 else 0.0
+    ended = ForceBlocks(
+        0.0, 0.0, 0.0, 0.0, x, y, change_x if m.blocks > 0.0 else 0.0, change_y if m.blocks > 0.0 else 0.0,
+        m.blocks + 1.0, m.power + share * (square * BLOCK_S / 12.0 - m.power),
+    )  # fmt: skip
+    anew = ForceBlocks(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, m.power)
+    return summed if lasts_s < BLOCK_S else (ended if lasts_s < 2.0 * BLOCK_S else anew)
 
 
 @equation

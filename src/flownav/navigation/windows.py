@@ -25,6 +25,9 @@ STEADY_RANGE_M = 0.03  # at rest ranges span 0.01 m at most (indoor-made), in fl
 SPAN_SIGMAS = 4.0  # of white noise in a window's ranges, 8 to 30 of them: 2.8 to 4.1 sigma on average
 CONTACT_M = 0.35  # on the ground, where none was seen yet: sonars say 0.30 to all that is nearer (mocap, outdoor-2)
 RESTING_FLOW_M_S, SHAKEN_FLOW_M_S = 0.3, 0.1  # on the ground 0 (indoor-made), 0.03 (outdoor), 0.17 (outdoor-2) at most
+# Nearer to the ground no lens is in focus, nor is its flow fused (`flow_min_height_m`): it does not show whether the
+# vehicle slides, and a range that stays there for half a second shows that it stands
+BLURRED_M = 0.05
 RESTING_GPS_M_S = 1.0  # on the ground receivers say 0.2 (outdoor) to 0.7 m/s (outdoor-3) at most
 MOVES, SHAKEN, RESTS = 0.0, 1.0, 2.0  # what a vehicle does: it moves, stands with its motors on, or off
 NO_READINGS, NOTHING_SEEN = ImuWindow(), SeenWindow()
@@ -124,7 +127,9 @@ def judge_standing(gyro: ImuWindow, seen: SeenWindow, contact_m: float, last_m: 
     seen_still = flow_m_s < RESTING_FLOW_M_S or was_near  # a lens on the ground sees nothing, and may say anything
     rests = enough and quiet and unmoved and seen_still and ((touching and steady) or (not ranged and not was_far))
     below = (touching and steady) or was_near
-    shaken = enough and unmoved and below and seen.flows > 0.0 and flow_m_s < SHAKEN_FLOW_M_S
+    blurred = touching and seen.range_high_m < BLURRED_M
+    seen_so = seen.flows > 0.0 and flow_m_s < SHAKEN_FLOW_M_S
+    shaken = enough and unmoved and below and (seen_so or blurred)
     return RESTS if rests else (SHAKEN if shaken else MOVES)
 
 

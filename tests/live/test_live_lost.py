@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from flownav.core.measurement import Sensor
+from flownav.logs.mavlink.framing import coder
 from played_recordings import Played
+from recorded_link import Arrival
+from scaled_imu import scaled_imu_beside
+
+OPTICAL_FLOW_RAD = 106
 
 
 @pytest.fixture
@@ -43,6 +48,48 @@ def test_flow_that_cannot_be_believed_is_said_and_its_end_is_a_counted_reset(pla
     velocities = [now_s for now_s, message in found.sent if message.msgname == "VISION_SPEED_ESTIMATE"]
     assert len(velocities) > 20.0 * (anchored - withheld[0])
     assert found.longest_gap_s(anchored) < 0.2
+
+
+def noisy_flow(since_s, until_s, noise_rad_s):
+    """A recording of PX4 whose flow sensor sees noise for a while."""
+
+    def heard(frames, truth):
+        mav, chance = coder(1, 1), np.random.default_rng(3)
+        for arrival in scaled_imu_beside(frames, truth):
+            yield arrival if arrival.message_id != OPTICAL_FLOW_RAD else noisy(arrival, mav, chance)
+
+    def noisy(arrival, mav, chance):
+        said = mav.decode(bytearray(arrival.frame))
+        if not since_s <= said.time_usec * 1e-6 < until_s:
+            return arrival
+        for name in ("integrated_x", "integrated_y"):
+            off_rad = chance.normal(0.0, noise_rad_s) * said.integration_time_us * 1e-6
+            setattr(said, name, getattr(said, name) + off_rad)
+        mav.srcSystem, mav.srcComponent, mav.seq = arrival.frame[5], arrival.frame[6], arrival.frame[4]
+        told = [getattr(said, name) for name in said.ordered_fieldnames]
+        again = mav.optical_flow_rad_encode(**dict(zip(said.ordered_fieldnames, told, strict=True)))
+        return Arrival(arrival.now_s, bytes(again.pack(mav)))
+
+    return heard
+
+
+def test_px4_too_is_told_the_velocity_alone_and_then_another_place(data_folder):
+    """8 s of noise without GPS; PX4 was sent nothing any more, for good."""
+    folder = data_folder / "px4-live" / "px4-indoor-liftoff-bias"
+    found = Played(folder, 68.0, beside=noisy_flow(55.0, 63.0, 1.0))
+    withheld = [t_s for t_s in found.notes.when("withheld") if t_s > 50.0]
+    assert withheld[0] < 56.0
+    before = found.between(50.0, withheld[0])
+    assert np.hypot(*found.error_m[before, :2].T).max() < 1.0
+    [anchored] = found.notes.when("anchored")
+    assert 63.0 < anchored < 63.0 + 5.0
+    places = np.isfinite(found.error_m[:, 0])
+    assert not places[found.between(withheld[0] + 0.05, anchored - 0.05)].any()
+    assert found.session.velocities > 20.0 * (anchored - withheld[0])
+    after = found.between(anchored + 0.01, np.inf)
+    assert set(found.resets[after]) == {found.resets[before][-1] + 1}
+    strayed_m = found.error_m[after, :2] - found.error_m[after, :2][0]
+    assert np.hypot(*strayed_m.T).max() < 0.5
 
 
 def test_a_stuck_accelerometer_is_not_flown_on(played):

@@ -103,11 +103,44 @@ def test_what_it_says_of_arming_is_passed_on_but_what_flownav_cures():
     found, _ = checked(ARDUPILOT, ardupilot(), says=says)
     assert found.ready.says == (REFUSED,)
     assert found.as_dict()["autopilot_says"] == (REFUSED,)
+    assert not found.fits
+    assert found.verdict == "ArduPilot's parameters fit `--send odometry`; it cannot arm yet"
 
 
 def test_one_that_flies_is_not_told_to_run_its_checks():
     _, autopilot = checked(ARDUPILOT, ardupilot(), armed=True, says=(REFUSED,))
     assert autopilot.counts["COMMAND_LONG"] == 0
+
+
+COMPASSES_OFF = {"COMPASS_USE": 0, "COMPASS_USE2": 0, "COMPASS_USE3": 0}
+
+
+@pytest.mark.parametrize(
+    ("compass", "needs"),
+    [
+        ({"COMPASS_ENABLE": 1, "COMPASS_USE": 1}, None),
+        ({"COMPASS_ENABLE": 0, "COMPASS_USE": 1}, "COMPASS_ENABLE"),
+        ({"COMPASS_ENABLE": 1} | COMPASSES_OFF, "COMPASS_USE"),
+        ({"COMPASS_ENABLE": 1} | COMPASSES_OFF | {"COMPASS_USE2": 1}, None),
+        ({}, None),
+    ],
+)
+def test_a_heading_by_a_compass_that_is_off_blocks_arming(compass, needs):
+    """EK3_SRC1_YAW 1 was "ok", and the vehicle was said to fit."""
+    found, _ = checked(ARDUPILOT, ardupilot(**compass))
+    assert found.fits == (needs is None)
+    said = [block.says for block in found.blocks]
+    assert said == ([f"AHRS: EK3 sources require Compass; {needs} is 0"] * 3 if needs else [])
+    assert ("cannot arm" in found.verdict or "arming is blocked" in found.verdict) == (needs is not None)
+
+
+def test_where_no_set_of_sources_is_on_gps_nobody_is_sent_to_one():
+    """It read: Take off on source set 1 (GPS)."""
+    sets = {f"EK3_SRC1_{what}": number for what, number in OURS.items()}
+    found, _ = checked(ARDUPILOT, ardupilot(**sets, EK3_SRC2_POSXY=0, EK3_SRC2_VELXY=0, EK3_SRC2_VELZ=0))
+    [line] = found.in_flight
+    assert line.startswith("No source set is on GPS")
+    assert "take off on set 1" in line
 
 
 def test_gps_in_another_set_of_sources_is_named_by_its_own_number():

@@ -2,89 +2,16 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline
-from scipy.spatial.transform import Rotation
 
-from flownav.core.frames import GRAVITY_M_S2
 from flownav.core.measurement import Sensor
-from flownav.live.filtering import Keeper
 from flownav.logs.mavlink.framing import coder
-from recorded_link import Arrival, arrivals, play
+from played_recordings import Played
+from recorded_link import Arrival
+from scaled_imu import scaled_imu_beside
 
-RAW_IMU = 27
-
-
-class Notes(Keeper):
-    """The happenings of a session."""
-
-    def __init__(self):
-        self.all = []
-
-    def note(self, t_s, source, kind, detail, value=float("nan")):
-        self.all.append((t_s, source, kind, detail))
-
-    def when(self, kind):
-        return [t_s for t_s, _, what, _ in self.all if what == kind]
-
-
-def with_others(heard, truth, messages):
-    """Beside each second RAW_IMU of a recording other sensors of the vehicle: what the simulator's truth would have an
-    accelerometer feel, by the slope of its velocity, with a bias and noise of their own; the gyro as RAW_IMU tells it.
-    """
-    mav, chance, turns = coder(1, 1), np.random.default_rng(9), 0
-    slope = CubicSpline(truth["boot_s"], np.column_stack([truth[f"vel_{a}_m_s"] for a in "ned"])).derivative()
-    angles = CubicSpline(
-        truth["boot_s"], np.unwrap(np.column_stack([truth[f"{n}_rad"] for n in ("roll", "pitch", "yaw")]), axis=0)
-    )
-    bias_m_s2 = chance.normal(0.0, 0.1, (len(messages), 3))
-    for arrival in heard:
-        yield arrival
-        if arrival.message_id != RAW_IMU:
-            continue
-        turns += 1
-        raw = mav.decode(bytearray(arrival.frame))
-        t_s = raw.time_usec * 1e-6
-        if turns % 2 or not truth["boot_s"][0] < t_s < truth["boot_s"][-1]:
-            continue
-        rotation = Rotation.from_euler("xyz", angles(t_s)).as_matrix()
-        force = rotation.T @ (slope(t_s) - [0.0, 0.0, GRAVITY_M_S2])
-        for number, message in enumerate(messages):
-            felt = force + bias_m_s2[number] + chance.normal(0.0, 0.05, 3)
-            milli_g = [round(value * 1e3 / GRAVITY_M_S2) for value in felt]
-            encode = getattr(mav, f"{message.lower()}_encode")
-            told = encode(round(t_s * 1e3), *milli_g, raw.xgyro, raw.ygyro, raw.zgyro, 0, 0, 0)
-            yield Arrival(arrival.now_s, bytes(told.pack(mav)))
-
-
-class Played:
-    """A recording that was played: notes, and what was sent beside the truth."""
-
-    def __init__(self, folder, until_s, others=()):
-        self.notes = Notes()
-        truth = np.genfromtxt(folder / "truth.csv", delimiter=",", names=True)
-        heard = with_others(arrivals(folder, until_s), truth, others)
-        self.session, self.sent = play(heard, keeper=self.notes)
-        told = [message for _, message in self.sent if message.msgname == "ODOMETRY"]
-        self.t_s = np.array([message.time_usec * 1e-6 for message in told])
-        place = np.array([[message.x, message.y, message.z] for message in told]).reshape(-1, 3)
-        true = np.column_stack([np.interp(self.t_s, truth["boot_s"], truth[f"pos_{a}_m"]) for a in "ned"])
-        self.error_m = place - true
-        self.resets = np.array([message.reset_counter for message in told])
-        self.yaw_rad = np.array(
-            [np.arctan2(2 * (m.q[0] * m.q[3] + m.q[1] * m.q[2]), 1 - 2 * (m.q[2] ** 2 + m.q[3] ** 2)) for m in told]
-        )
-        self.true_yaw_rad = np.interp(self.t_s, truth["boot_s"], np.unwrap(truth["yaw_rad"]))
-
-    def between(self, since_s, until_s):
-        return (self.t_s >= since_s) & (self.t_s < until_s)
-
-    def longest_gap_s(self, since_s):
-        later = self.t_s[self.t_s >= since_s]
-        return max(b - a for a, b in pairwise(later))
+OPTICAL_FLOW_RAD = 106
 
 
 @pytest.fixture
@@ -121,6 +48,48 @@ def test_flow_that_cannot_be_believed_is_said_and_its_end_is_a_counted_reset(pla
     velocities = [now_s for now_s, message in found.sent if message.msgname == "VISION_SPEED_ESTIMATE"]
     assert len(velocities) > 20.0 * (anchored - withheld[0])
     assert found.longest_gap_s(anchored) < 0.2
+
+
+def noisy_flow(since_s, until_s, noise_rad_s):
+    """A recording of PX4 whose flow sensor sees noise for a while."""
+
+    def heard(frames, truth):
+        mav, chance = coder(1, 1), np.random.default_rng(3)
+        for arrival in scaled_imu_beside(frames, truth):
+            yield arrival if arrival.message_id != OPTICAL_FLOW_RAD else noisy(arrival, mav, chance)
+
+    def noisy(arrival, mav, chance):
+        said = mav.decode(bytearray(arrival.frame))
+        if not since_s <= said.time_usec * 1e-6 < until_s:
+            return arrival
+        for name in ("integrated_x", "integrated_y"):
+            off_rad = chance.normal(0.0, noise_rad_s) * said.integration_time_us * 1e-6
+            setattr(said, name, getattr(said, name) + off_rad)
+        mav.srcSystem, mav.srcComponent, mav.seq = arrival.frame[5], arrival.frame[6], arrival.frame[4]
+        told = [getattr(said, name) for name in said.ordered_fieldnames]
+        again = mav.optical_flow_rad_encode(**dict(zip(said.ordered_fieldnames, told, strict=True)))
+        return Arrival(arrival.now_s, bytes(again.pack(mav)))
+
+    return heard
+
+
+def test_px4_too_is_told_the_velocity_alone_and_then_another_place(data_folder):
+    """8 s of noise without GPS; PX4 was sent nothing any more, for good."""
+    folder = data_folder / "px4-live" / "px4-indoor-liftoff-bias"
+    found = Played(folder, 68.0, beside=noisy_flow(55.0, 63.0, 1.0))
+    withheld = [t_s for t_s in found.notes.when("withheld") if t_s > 50.0]
+    assert withheld[0] < 56.0
+    before = found.between(50.0, withheld[0])
+    assert np.hypot(*found.error_m[before, :2].T).max() < 1.0
+    [anchored] = found.notes.when("anchored")
+    assert 63.0 < anchored < 63.0 + 5.0
+    places = np.isfinite(found.error_m[:, 0])
+    assert not places[found.between(withheld[0] + 0.05, anchored - 0.05)].any()
+    assert found.session.velocities > 20.0 * (anchored - withheld[0])
+    after = found.between(anchored + 0.01, np.inf)
+    assert set(found.resets[after]) == {found.resets[before][-1] + 1}
+    strayed_m = found.error_m[after, :2] - found.error_m[after, :2][0]
+    assert np.hypot(*strayed_m.T).max() < 0.5
 
 
 def test_a_stuck_accelerometer_is_not_flown_on(played):

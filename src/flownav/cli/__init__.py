@@ -90,7 +90,8 @@ def made(names: Iterable[str]) -> typer.Typer:
     app.callback()(about)
     for name in names:
         module, function = ELSEWHERE.get(name, (name, "command"))
-        app.command(name, short_help=COMMANDS[name])(getattr(import_module(f"flownav.cli.{module}"), function))
+        found = import_module(f"flownav.cli.{module}")
+        app.command(name, cls=getattr(found, "SHOWN", None), short_help=COMMANDS[name])(getattr(found, function))
     return app
 
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from flownav.cli import options
+from flownav.cli import live_help, options
 from flownav.cli.options import chosen, named, one_of, option, switch
 from flownav.cli.output import answer, require_between, require_recordable, say, say_files
 from flownav.core.errors import InputError, VerdictError
@@ -48,6 +48,7 @@ Accept = Annotated[list[str] | None, option("MESSAGE=SYSTEM.COMPONENT", ACCEPT)]
 Duration = Annotated[float | None, option("S", DURATION, unset="at Ctrl-C", within=(0.1, 1e6))]
 Capacity = Annotated[float | None, option("BYTES/S", CARRIES, unset=BAUD, within=(500.0, 1e9))]
 Origin = Annotated[str | None, option("LAT,LON,ALT", ORIGIN, unset="none is set")]
+SHOWN = live_help.SHOWN
 SourceSet = Annotated[int | None, option("1..3", SOURCES, unset="a free one", within=(1, 3))]
 
 

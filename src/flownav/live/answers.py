@@ -8,7 +8,7 @@ import numpy as np
 from flownav.core.compile import ONE_LANE
 from flownav.core.frames import Vector, rotation_from_quaternion, to_body
 from flownav.core.measurement import Array
-from flownav.estimation.states import PAD, STATE
+from flownav.estimation.states import PAD, QUATERNION, STATE
 from flownav.live.anchor import NOTHING, Base, holds
 from flownav.live.options import Limits, Options
 from flownav.live.reception import Vehicle
@@ -111,6 +111,11 @@ def estimate_of(
         resets,
         quality_of(on, pose, velocity, t_s, limits, base),
     )
+
+
+def tilt_cosine(work: Array) -> float:
+    """Cosine of the angle between the vehicle's down and the earth's."""
+    return float(rotation_from_quaternion(*map(float, work[QUATERNION : QUATERNION + 4]))[8])
 
 
 def _full(triangle: Array, count: int) -> Array:

@@ -4,6 +4,7 @@ from collections import Counter, deque
 
 from flownav.core.frames import Vector
 from flownav.core.measurement import Measurement, Sensor
+from flownav.live.field import Field
 from flownav.live.filtering import FLOW, handed_over
 from flownav.live.horizon import LATE, Lags, Serving, Source, Sources
 from flownav.live.inertial import Inertial
@@ -50,7 +51,7 @@ class Hearing:
         self.gps_heard = self.flow_came = False
         self.flow_waited = 0  # flow readings that shared their estimate with a later one
         self._flow_s = NAN  # the vehicle's time of the last flow reading
-        self.repeats, self.inertial = Repeats(), Inertial()
+        self.repeats, self.inertial, self.field = Repeats(), Inertial(), Field()
         self._unbiased_s: deque[float] = deque(maxlen=LEAST_UNBIASED)
         self.swaps: deque[tuple[float, Source, str]] = deque()  # inertial sources that were found wrong, since when
 
@@ -60,6 +61,7 @@ class Hearing:
         self.lags.clear()
         self.serving.clear()
         self.inertial.clear()
+        self.field.clear()
         self.sources.barred.clear()
         self._unbiased_s.clear()
         self.newest_s = self.since_s = NAN
@@ -100,6 +102,8 @@ class Hearing:
         if message.msgname == "GPS_RAW_INT":
             self._fix(message, here_ned_m)
         context = Context(vehicle.make == ARDUPILOT, by_autopilot, self.origin.navigator_deg_m, pose)
+        if vehicle.make == PX4 and by_autopilot and message.msgname == UNBIASED:
+            self.field.sensed(message, aligned.t_s)
         for outcome in measurements(message, aligned.t_s, context):
             if isinstance(outcome, Dropped) or aligned.reason:
                 reason = outcome.reason if isinstance(outcome, Dropped) else aligned.reason
@@ -107,8 +111,15 @@ class Hearing:
             elif (
                 outcome.sensor != Sensor.IMU or self._compared(source, vehicle, outcome, now_s)
             ) and self.sources.takes(outcome.sensor, source, aligned.t_s):
-                self._reading(outcome, now_s)
+                self._reading(self._restored(outcome), now_s)
         return ""
+
+    def _restored(self, reading: Measurement) -> Measurement:
+        """A magnetometer's reading without what PX4's EKF2 has learnt of it; all others as they are."""
+        if reading.sensor != Sensor.MAG:
+            return reading
+        x, y, z = reading.value[:3]
+        return reading._replace(value=self.field.restored((x, y, z), reading.t_s))
 
     def _compared(self, source: Source, vehicle: Vehicle, reading: Measurement, now_s: float) -> bool:
         """An inertial reading, held against the others' where it is news; whether it says anything."""

@@ -1,9 +1,10 @@
 """What of the estimate of now may be sent: alarms of sensors that do not serve, limits, and what contradicts it."""
 
+from flownav.core.frames import Vector
 from flownav.core.measurement import Sensor
 from flownav.estimation.gating import Reason
 from flownav.live.anchor import PLACES, Anchor
-from flownav.live.answers import UNFUSED, estimate_of, fault_of, why_withheld
+from flownav.live.answers import UNFUSED, estimate_of, fault_of, tilt_cosine, why_withheld
 from flownav.live.filtering import Filtering, Keeper
 from flownav.live.hearing import GPS, Hearing
 from flownav.live.horizon import Refused
@@ -11,8 +12,10 @@ from flownav.live.inertial import Heights
 from flownav.live.options import Limits
 from flownav.live.vehicle_clock import VehicleClock
 from flownav.logs.mavlink.outgoing import Estimate
+from flownav.navigation.loop import Running
 from flownav.navigation.reasons import HORIZONTAL
 
+RECENT_S = 1.0  # a range and a landed state that are older do not say where a navigator begins: chosen
 HEIGHT_DOUBTED = "height_doubted"
 # What a sensor that does not serve may cause.
 OUTRANKED = ("", "position_invalid", "dead_reckoning", "flow_doubted", "unprotected")
@@ -32,6 +35,34 @@ class Offering:
         self.alarms: dict[Sensor, Refused] = {}
         self.past_alarms: dict[Sensor, Refused] = {}
         self.settled = False
+        self._begun: Running | None = None  # the navigator whose beginning has been judged
+        self._raised_m = 0.0
+
+    @property
+    def offset_ned_m(self) -> Vector:
+        """Of the navigator's origin in the frame that is sent [m].
+
+        One that begins in flight without GPS begins at 0, and is above the ground by what the range says: what is sent
+        is about the ground below, until an origin and a fix say more.
+        """
+        north_m, east_m, down_m = self.hearing.origin.offset_ned_m
+        unknown = not (north_m or east_m or down_m)
+        return north_m, east_m, down_m - self._raised_m if unknown else down_m
+
+    def _raise(self, t_s: float) -> None:
+        """Judge a navigator once, as soon as it has started."""
+        on, here_ned_m = self.filtering.running, self.filtering.here_ned_m
+        if on is None or here_ned_m is None or on is self._begun:
+            return
+        self._begun, self._raised_m = on, 0.0
+        above, landed = (self.hearing.latest.get(sensor) for sensor in (Sensor.RANGE, Sensor.LANDED))
+        if not self.filtering.lacks_gps or above is None or landed is None or landed.value[0]:
+            return
+        if min(above.t_s, landed.t_s) >= t_s - RECENT_S:
+            self._raised_m = max(above.value[0] * tilt_cosine(on.work) + here_ned_m[2], 0.0)
+            self.keeper.note(
+                t_s, "live", "begun_in_flight", "the height is the range's, above the ground", self._raised_m
+            )
 
     def begin_anew(self) -> None:
         """The vehicle may be elsewhere now."""
@@ -41,6 +72,7 @@ class Offering:
 
     def watch(self, t_s: float) -> None:
         """Alarms that begin and end go into the record."""
+        self._raise(t_s)
         if self.filtering.running is not None:
             self.anchor.watch(self.filtering.running, t_s)
         found = self.hearing.serving.alarms(t_s, self.limits.unfused_s)
@@ -77,8 +109,8 @@ class Offering:
             reason = "origin_doubted"
         if on is None or (reason and reason not in PLACES):
             return reason, None
-        offset_ned_m = self.hearing.origin.offset_ned_m
-        estimate = estimate_of(on, self.filtering.now(t_s), t_s, clock.boot_s(t_s), resets, offset_ned_m, limits, base)
+        now, boot_s = self.filtering.now(t_s), clock.boot_s(t_s)
+        estimate = estimate_of(on, now, t_s, boot_s, resets, self.offset_ned_m, limits, base)
         fault = fault_of(estimate, limits, base)
         if fault and (not reason or fault not in PLACES):
             reason = fault

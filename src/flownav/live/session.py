@@ -288,7 +288,7 @@ class Session:
         messages: list[Message] = []
         if estimate is not None and not reason:
             self.estimate = estimate
-            offset_ned_m = self.hearing.origin.offset_ned_m
+            offset_ned_m = self.offering.offset_ned_m
             assert self.filtering.running is not None
             messages = self.answers.estimates(vehicle, estimate, self.filtering.running, offset_ned_m)
             reason = "" if messages else "nothing_asked" if self.options.send == "none" else "no_pad"

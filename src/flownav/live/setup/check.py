@@ -6,12 +6,17 @@ from typing import Any
 from flownav.live.link import Address
 from flownav.live.reception import Vehicle
 from flownav.live.setup.arming import RECEIVERS, Place, Readiness, has_no_gps, readiness
-from flownav.live.setup.compare import Block, Row, blocks_of, port_names, port_of, rows_of, source_set
+from flownav.live.setup.compare import Block, Row, blocks_of, gps_set, port_names, port_of, rows_of, source_set
 from flownav.live.setup.knowledge import Knowledge, knowledge_of
 from flownav.live.setup.talk import Change, Talk, read, why_not, write
 from flownav.logs.mavlink.framing import Value
 
+NO_GPS_SET = (
+    "No source set is on GPS (EK3_SRCn_POSXY 3), so there is none to switch back to: give one of the others GPS as its "
+    "source, or take off on set {n} with flownav sending."
+)
 MEET_S = 10.0  # chosen: ten HEARTBEATs
+FITS, FIT = " fits", "'s parameters fit"  # the latter of a vehicle that something else keeps from arming
 ENABLING = ("VISO_TYPE", "PLND_ENABLED")  # ArduPilot shows the rest of the group once these are set
 
 
@@ -102,9 +107,9 @@ def check(
             report.verdict += "; the vehicle must be rebooted"
     if send in ("odometry", "vision"):
         report.ready = readiness(talk, known.name.lower(), values, origin)
-        if report.ready.missing:
+        if report.ready.missing or report.ready.says:
+            report.verdict = report.verdict.replace(FITS, FIT) + ("" if report.blocks else "; it cannot arm yet")
             report.fits = False
-            report.verdict += "; it cannot arm yet"
     return report
 
 
@@ -128,12 +133,16 @@ def _compared(
         notes.insert(0, f"What is absent may appear once {' or '.join(ENABLING)} is set: run this again then.")
     unusual = sum(row.status == "unusual" for row in rows)
     verdict = (
-        f"{known.name} fits `--send {send}`" + (f"; {unusual} values are not what is advised" if unusual else "")
+        f"{known.name}{FITS} `--send {send}`" + (f"; {unusual} values are not what is advised" if unusual else "")
         if fits
-        else f"{len(wrong)} of {len(rows)} parameters must change" + ("; arming is blocked" if blocks else "")
+        else f"{len(wrong)} of {len(rows)} parameters must change{'; arming is blocked' if blocks else ''}"
+        if wrong
+        else "arming is blocked by the values that are named"
     )
+    other = gps_set(values, chosen)
     in_flight = known.in_flight if by_estimate and not without else ()
-    other = 2 if chosen == 1 else 1  # of GPS
+    if in_flight and chosen and not other:
+        in_flight = (NO_GPS_SET,)
     return Report(
         verdict, fits, known.name, send=send, source_set=chosen if by_estimate else 0, rows=rows, blocks=blocks,
         port=port, notes=notes,

@@ -16,7 +16,7 @@ FAST_BAUD = 460_800  # baud at which all that flownav asks for fits
 SLOW_LINE = "{} baud carry {} bytes/s each way: rates are reduced to fit (docs/how-to/live.md). Change both ends"
 SERIAL_SOURCE = "libraries/AP_SerialManager/AP_SerialManager.cpp (n_PROTOCOL, n_BAUD)"
 MAV_SOURCE = "src/modules/mavlink/module.yaml (MAV_${i}_RATE); docs serial_configuration"
-EXTERNAL_NAV = 6  # AP_NavEKF_Source
+EXTERNAL_NAV, GPS_SOURCE = 6, 3  # AP_NavEKF_Source
 
 
 class Port(NamedTuple):
@@ -140,6 +140,12 @@ def source_set(known: Knowledge, values: dict[str, Value], asked: int | None = N
             return n
     free = [n for n in SETS[1:] if has(n, "POSXY") == 0.0 and has(n, "VELXY") == 0.0]
     return free[0] if free else known.first_source_set
+
+
+def gps_set(values: dict[str, Value], ours: int) -> int:
+    """The first source set beside ours whose position is by GPS; 0 where none is."""
+    positions = {n: values.get(f"EK3_SRC{n}_POSXY") for n in SETS if n != ours}
+    return next((n for n, value in positions.items() if value is not None and value.number == GPS_SOURCE), 0)
 
 
 def rows_of(wanted: list[Wanted], values: dict[str, Value]) -> list[Row]:

@@ -78,21 +78,24 @@ class Wanted(Rule):
 class Arming(Rule):
     """Values at which the make refuses to arm. {any} stands for every source set, {name} for the parameter.
 
-    needs: where a value is one of these, this parameter must not be one of needs_not. says: the make's own words.
+    needs: where a value is one of these, this parameter must not be one of needs_not; or_any: others, any of which will
+    do in its place. says: the make's own words.
     """
 
     names: tuple[str, ...]
     needs: str = ""
     needs_not: tuple[float, ...] = ()
+    or_any: tuple[str, ...] = ()
     says: str
     source: str
 
     def blocks(self, name: str, values: dict[str, Value]) -> bool:
         """Whether this rule keeps a vehicle with these values from arming, by one parameter."""
-        found, other = values.get(name), values.get(self.needs)
+        found = values.get(name)
         if found is None or not self.fits(found.number):
             return False
-        return not self.needs or (other is not None and other.number in self.needs_not)
+        others = [values[other].number for other in (self.needs, *self.or_any) if other in values]
+        return not self.needs or (self.needs in values and all(number in self.needs_not for number in others))
 
 
 class Knowledge(ParameterModel):
@@ -123,7 +126,9 @@ class Knowledge(ParameterModel):
     def names(self, send: str) -> list[str]:
         """Every parameter to ask for, once."""
         asked = [
-            name for rule in self.arming for name in [*self.arming_names(rule), *([rule.needs] if rule.needs else [])]
+            name
+            for rule in self.arming
+            for name in [*self.arming_names(rule), *([rule.needs] if rule.needs else []), *rule.or_any]
         ]
         for row in self.wanted(send, self.first_source_set):
             asked += row.any_of or (row.name, *row.alternatives)

@@ -90,11 +90,13 @@ def command(
     require_between("--records", records, 0, FLIGHTS_TOLD)
     require_engine(engine)
     asked = load_requirement(requirement)
+    plan = plan_of(asked, flights, vehicle)
     if plan_only:
+        for cell in range(len(plan.cells)):
+            plan.ready(cell)  # what cannot be flown is refused here, as it is without --plan
         _say_plan(asked, as_json)
         return
     signer = None if sign is None else private_key(sign)
-    plan = plan_of(asked, flights, vehicle)
     folder = out or Path("out") / f"{asked.name}_certificate"
     how = How(engine_named(engine), ranking, records, again, signer)
     facts = _fly(asked, plan, how, requirement, folder)

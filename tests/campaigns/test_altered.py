@@ -120,6 +120,22 @@ def test_who_only_reads_a_damaged_part_is_told(folder):
         Dataset(folder).table(0)
 
 
+def test_who_only_reads_a_part_whose_columns_name_changed_by_a_bit_is_told(folder):
+    """Pages have checksums, the footer has none: every reading holds the digests, of one column as of all."""
+    path = Dataset(folder).parts(0)[0]
+    path.write_bytes(path.read_bytes().replace(b"x.rms_error", b"x.rmc_error"))
+    for read in (Dataset(folder).rows, Dataset(folder).table, lambda cell: Dataset(folder).column(cell, "flight")):
+        with pytest.raises(InputError, match=r"part-00000.parquet: is damaged \(row 1 is not what its digest says\)"):
+            read(0)
+
+
+def test_who_only_reads_edited_scores_is_told(folder):
+    path = Dataset(folder).parts(0)[0]
+    rewritten(path, with_score(0.0, slice(17, 18)), chained=False)
+    with pytest.raises(InputError, match=r"is damaged \(row 18 is not what its digest says\)"):
+        Dataset(folder).column(0, SCORE)
+
+
 # -- edits ---------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize(("rows", "named"), [(slice(None), "row 1 "), (slice(17, 18), "row 18 ")])
 def test_overwritten_scores_are_named_and_flown_again(folder, rows, named):

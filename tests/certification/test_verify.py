@@ -109,22 +109,34 @@ def test_a_requirement_that_was_altered_since_is_told_to_the_last_digit(made, fo
     assert "it is another than when the flights were flown" in wrong(folder, requirement=str(other))["requirement"]
 
 
-def test_without_the_requirement_what_cannot_be_looked_at_is_said(tmp_path):
+def test_without_the_requirement_nothing_is_shown(tmp_path):
     path = write(tmp_path, HEAD + WINDY + ASKED)
     run(path, "--out", tmp_path / "out", "--ranking", 0, "--records", 0)
     moved = shutil.move(path, tmp_path / "moved.toml")
     told = found(tmp_path / "out")
     assert told["plan, figures, flights flown again"][0] == "not checked"
     assert "name it as well" in told["plan, figures, flights flown again"][1]
+    done = run("--verify", tmp_path / "out")
+    assert isinstance(done.exception, VerdictError)
+    assert str(done.exception).endswith("out: plan, figures, flights flown again: not checked: the requirement's file "
+                                        "is not there; name it as well")  # fmt: skip
     assert run("--verify", tmp_path / "out", moved, "--again", 4).exit_code == 0
 
 
-def test_what_another_version_made_is_judged_but_not_flown_again(folder):
+def test_what_says_that_another_version_made_it_is_not_shown(folder):
+    """Or who forges everything would only have to say so."""
+    forged(folder)
+    forge_all(folder)
     rehashed(folder, lambda facts: facts["made_by"].update(code_sha256="0" * 64))
     told = found(folder)
     assert told["version, flights flown again, page"][0] == "not checked"
     assert "of another code than this one" in told["version, flights flown again, page"][1]
     assert told["figures"][0] == "holds"
+    done = run("--verify", folder)
+    assert isinstance(done.exception, VerdictError)
+    assert done.stdout.startswith("NOT SHOWN  small, certified as: pass")
+    assert "version, flights flown again, page: not checked: made by flownav" in str(done.exception)
+    assert json.loads(run("--verify", folder, "--json").stdout)["verification"] == "not shown"
 
 
 @pytest.mark.parametrize(("text", "said"), [

@@ -100,3 +100,19 @@ def test_a_folder_of_something_else_is_not_written_to(tmp_path):
     failed = run(write(tmp_path, HEAD + CALM + CRASH), "--out", tmp_path / "full")
     assert "full: is there and holds no campaign; give another name" in printed(failed.exception)
     assert [path.name for path in (tmp_path / "full").iterdir()] == ["flight.txt"]
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    (HEAD.replace("[set.filter]", 'vehicle = "nosuch"\n[set.filter]') + ASKED, "nosuch: no such vehicle; shipped"),
+    (HEAD + WINDY + 'vehicle = ["nosuch"]\n' + ASKED, "nosuch: no such vehicle; shipped: maxi-joker-3"),
+    (HEAD + WINDY + 'sensor = ["/dev/zero"]\n' + ASKED, "/dev/zero: a device is not read"),
+    (HEAD + WINDY + 'fault = ["gps_loss"]\n' + ASKED, "fault gps_loss: the paper's filter has no sensors that fail"),
+])  # fmt: skip
+def test_a_plan_of_what_cannot_be_flown_is_refused_as_the_flights_are(tmp_path, text, said):
+    path = write(tmp_path, text)
+    for more in (["--plan"], []):
+        done = run(path, "--out", tmp_path / "out", *more)
+        assert isinstance(done.exception, InputError)
+        assert said in str(done.exception)
+    assert not (tmp_path / "out").exists()
+    assert "f16: no such vehicle" in str(run("approach", "--plan", "--vehicle", "f16").exception)

@@ -39,6 +39,8 @@ NOTES = {
     "broken.json": '{"flownav_sha256": ',
     "page.html": "<html><head><title>x</title></head><body><meta name=\"generator\" content=\"flownav\"></body></html>",
     "quoted.html": "<html><head><title>the mark <meta name=\"generator\" content=\"flownav\"></title></head></html>",
+    "comment.html": '<!-- <head><meta name="generator" content="flownav"> --><html><head></head></html>',
+    "early.html": '<html><meta name="generator" content="flownav"><head><title>x</title></head></html>',
     "plain.txt": "flownav flew well today\n",
 }  # fmt: skip
 

@@ -213,3 +213,11 @@ def test_what_cannot_be_read_is_one_line(tmp_path, content, why):
 def test_a_flow_instance_is_refused(contents, tmp_path):
     with pytest.raises(InputError, match="with one flow sensor at most"):
         open_log(written(tmp_path / "a.bbl", contents[INAV]), flow_instance=0)
+
+
+@pytest.mark.parametrize("value", ["9" * 400, "1e300", "nan", "-inf", "0x7f800000", "0x7fc00000"])
+def test_a_setting_that_no_controller_holds_is_as_one_that_is_missing(contents, tmp_path, value):
+    bad = contents[INAV].replace(b"minthrottle:1070", f"minthrottle:{value}".encode())
+    missing = contents[INAV].replace(b"H minthrottle:1070\n", b"")
+    logs = [read_blackbox(written(tmp_path / f"{k}.bbl", content)) for k, content in enumerate((bad, missing))]
+    assert largest_difference(logs[0], logs[1], Sensor.IMU) == 0.0

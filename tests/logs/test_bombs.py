@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import bz2
+import sqlite3
+from contextlib import closing
+
 import pytest
 
 from blackbox_logs import blackbox_log
@@ -12,9 +16,12 @@ from flownav.core.errors import InputError
 from flownav.logs.assembly import MOST_BYTES, content_of
 from flownav.logs.csv_table import MOST_COLUMNS, MOST_HEADER_BYTES
 from flownav.logs.open_log import open_log
+from flownav.logs.ros.bag import Bag, TooLargeError, _rows, _Unpacking
+from flownav.logs.ros.containers import messages
 from fuzzing import FLOOR_BYTES, peak_bytes
 from mavlink_logs import flight_log
 from replay_logs import log_of_flight
+from ros_bags import BagMaker, StoragePlugin, ros_flight
 
 
 @pytest.fixture
@@ -74,3 +81,116 @@ def test_a_first_line_of_three_million_columns_is_refused(folder):
     assert f"gps.csv: 100001 columns; at most {MOST_COLUMNS} are read" in refused(folder)
     (folder / "gps.csv").write_bytes(b"x" * (MOST_HEADER_BYTES + 1))
     assert "its first line has more than" in refused(folder)
+
+
+# -- bags ----------------------------------------------------------------------------------------------------------
+ENDLESS = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT "
+
+
+@pytest.fixture(scope="module")
+def base(tmp_path_factory):
+    """A bag of one topic in SQLite."""
+    made = BagMaker()
+    made.put(0.0, "/chatter", "std_msgs/msg/String", made.kind("std_msgs/msg/String")(data="hello"))
+    (file,) = made.write(tmp_path_factory.mktemp("bag") / "b", StoragePlugin.SQLITE3).glob("*.db3")
+    return file.read_bytes()
+
+
+@pytest.mark.parametrize(("table", "columns"), [
+    ("messages", "i AS id, 1 AS topic_id, i AS timestamp, x'00' AS data FROM n"),
+    ("messages", "i AS id, 2 AS topic_id, i AS timestamp, zeroblob(900000000) AS data FROM n"),
+    ("topics", "i AS id, 'a' || i AS name, 'b' AS type, 'cdr' AS serialization_format FROM n"),
+    ("message_definitions", "'a' AS topic_type, 'b' AS encoding, 'c' AS encoded_message_definition FROM n"),
+])  # fmt: skip
+def test_a_view_that_never_ends_is_no_table(tmp_path, base, table, columns):
+    (tmp_path / "x.db3").write_bytes(base)
+    with closing(sqlite3.connect(tmp_path / "x.db3")) as made, made:
+        made.execute(f"DROP TABLE {table}")
+        made.execute(f"CREATE VIEW {table.upper()} AS {ENDLESS}{columns}")
+    assert f"x.db3: {table} is a view, no table of a ROS 2 bag; give it" in refused(tmp_path / "x.db3")
+
+
+def test_nor_is_a_virtual_table(tmp_path, base):
+    (tmp_path / "x.db3").write_bytes(base)
+    with closing(sqlite3.connect(tmp_path / "x.db3")) as made, made:
+        made.execute("DROP TABLE messages")
+        made.execute("CREATE VIRTUAL TABLE messages USING fts4(topic_id, timestamp, data)")
+    assert "messages is a virtual table, no table" in refused(tmp_path / "x.db3")
+
+
+def test_a_column_that_makes_its_values_gives_no_more_than_the_file_holds(tmp_path, base):
+    (tmp_path / "x.db3").write_bytes(base)
+    with closing(sqlite3.connect(tmp_path / "x.db3")) as made, made:
+        made.execute("DROP TABLE messages")
+        made.execute("CREATE TABLE messages(id, topic_id, timestamp, data GENERATED ALWAYS AS (zeroblob(500000000)))")
+        made.execute("INSERT INTO messages(id, topic_id, timestamp) VALUES (1, 1, 1)")
+    bag, before = Bag(), peak_bytes(anew=True)
+    assert list(messages(tmp_path / "x.db3", bag, lambda channel: True)) == []
+    assert peak_bytes() - before < FLOOR_BYTES
+    assert "x.db3: damaged (string or blob too big); what follows is left out" in bag.notes
+
+
+def test_rows_end_where_the_file_would_be_full():
+    """As of pages of a B-tree that lead to each other."""
+    with closing(sqlite3.connect(":memory:")) as made, pytest.raises(sqlite3.DataError, match="more rows than its"):
+        list(_rows(made, f"{ENDLESS}i FROM n", 1000))
+
+
+@pytest.mark.parametrize("packing", ["BZ2", "LZ4"])
+def test_a_chunk_of_ros_1_that_becomes_many_times_larger_is_left_out(tmp_path, packing):
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store, file = get_typestore(Stores.ROS1_NOETIC), tmp_path / "x.bag"
+    writer = Writer(file)
+    writer.set_compression(getattr(Writer.CompressionFormat, packing))
+    with writer:
+        topic = writer.add_connection("/imu", "sensor_msgs/msg/Imu", typestore=store)
+        writer.write(topic, 1, bytes(96 << 20))
+    assert file.stat().st_size < 1 << 19
+    assert "no message can be read (x.bag: damaged (a chunk of" in (said := refused(file))
+    assert said.endswith("; copy it again")
+
+
+def test_streams_after_streams_do_not_become_a_chunk():
+    """As of the case that was found: bzip2's library reads all that follow each other."""
+    unpacking, packed = _Unpacking(1 << 20), bz2.compress(bytes(100_000))
+    assert unpacking.bz2(packed * 10_000) == bytes(100_000)
+    unpacking.left = 0
+    with pytest.raises(TooLargeError):
+        unpacking.bz2(packed)
+
+
+def test_an_index_that_all_chunks_share_is_no_index(tmp_path):
+    """Kilobytes of chunk infos, all of one chunk, whose entries are read for each of them."""
+    made = ros_flight(log_of_flight(4.0).tables)
+    content = made.write_ros_1(tmp_path / "x.bag").read_bytes()
+    infos = content.rindex(b"op=\x06") - 8
+    many = content[:infos].replace(b"chunk_count=\x01\x00", b"chunk_count=\x10\x27") + content[infos:] * 10_000
+    (tmp_path / "x.bag").write_bytes(many)
+    said = "no readable ROS 1 bag (its index has more entries than its bytes can hold); try `rosbag reindex`"
+    assert said in refused(tmp_path / "x.bag")
+
+
+def test_a_chunk_in_a_chunk_is_damage(tmp_path):
+    """Or each would unpack to hundreds more."""
+    from mcap.writer import CompressionType, Writer
+
+    file = tmp_path / "x.mcap"
+    with file.open("wb") as stream:
+        writer = Writer(stream, compression=CompressionType.NONE, chunk_size=1 << 20)
+        writer.start(profile="ros2", library="other")
+        writer.register_channel("/imu", "cdr", writer.register_schema("sensor_msgs/msg/Imu", "ros2msg", b""))
+        writer.add_message(1, 1, b"x", 1)
+        writer.finish()
+    content = file.read_bytes()
+    start = content.index(b"\x06", 8 + 9 + int.from_bytes(content[9:17], "little"))
+    size = int.from_bytes(content[start + 1 : start + 9], "little")
+    inner = content[start : start + 9 + size]
+    body = (
+        bytes(16) + len(inner).to_bytes(8, "little") + bytes(4) + bytes(4) + len(inner).to_bytes(8, "little")
+    ) + inner
+    file.write_bytes(content[:start] + b"\x06" + len(body).to_bytes(8, "little") + body)
+    bag = Bag()
+    assert list(messages(file, bag, lambda channel: True)) == []
+    assert bag.notes == ["x.mcap: one record is damaged and left out"]

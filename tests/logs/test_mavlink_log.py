@@ -89,6 +89,29 @@ def test_without_a_local_position_the_global_one_serves(path):
     assert found.autopilot["pos_n_m"] == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.parametrize("global_too", [False, True])
+def test_an_origin_that_moves_is_told_by_the_global_position_and_a_reset_is_the_autopilots_own(path, global_too):
+    log = flight_log()
+    log.frames = [f for f in log.frames if f[1][7] != 32]  # LOCAL_POSITION_NED
+    for step in range(STEPS):
+        boot_ms, late = 20000 + 50 * step, step >= STEPS // 2
+        arrival_s, east_m = 0.05 * step + 0.02, 0.2 * step
+        local = {"x": 3.0 - 30.0 * late, "y": 4.0 + east_m, "z": -2.0 + 5.0 * late}
+        log.add(arrival_s, made("LOCAL_POSITION_NED", time_boot_ms=boot_ms, vy=4.0, **local))
+        north_m = 3.0 - 30.0 * (late and global_too)
+        lat, lon = round(470000000 + 89.93 * north_m), round(85000000 + 131.7 * (4.0 + east_m))
+        alt = 402000 - 5000 * (late and global_too)
+        log.add(arrival_s, made("GLOBAL_POSITION_INT", time_boot_ms=boot_ms, lat=lat, lon=lon, alt=alt))
+    log.frames.sort(key=lambda frame: frame[0])
+    found = read_tlog(log.write(path))
+    moved = "LOCAL_POSITION_NED: its origin moved by 30.4 m at 22.00 s, as GLOBAL_POSITION_INT shows"
+    assert (moved in notes(found)) != global_too
+    t_s = found.autopilot["t_s"]
+    expected = np.where(t_s >= 22.0 - 1e-6, -27.0 if global_too else 3.0, 3.0)
+    assert found.autopilot["pos_n_m"] == pytest.approx(expected, abs=0.1)
+    assert found.autopilot["pos_e_m"] == pytest.approx(4.0 + 4.0 * (t_s - 20.0), abs=0.1)
+
+
 def test_an_origin_that_is_not_in_the_log_is_said(path):
     log = flight_log()
     log.frames = [f for f in log.frames if f[1][7] != 49]

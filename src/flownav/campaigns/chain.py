@@ -100,8 +100,8 @@ def write_part(path: Path, table: Any, before: bytes, texts: Sequence[str] = ())
     return digests[-1]
 
 
-def read_checked(path: Path, columns: Sequence[str] | None = None) -> Any:
-    """A Parquet file's columns as a table, its pages' checksums held. DamagedError where it cannot be read so."""
+def _read_checked(path: Path) -> Any:
+    """A Parquet file as a table, its pages' checksums held. DamagedError where it cannot be read so."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -111,7 +111,7 @@ def read_checked(path: Path, columns: Sequence[str] | None = None) -> Any:
         texts = [field.name for field in schema if _kind(field.type) == "text"]
         source = pa.BufferReader(data)
         with pq.ParquetFile(source, page_checksum_verification=True, read_dictionary=texts) as file:
-            return file.read(list(columns) if columns is not None else None)
+            return file.read()
     except (OSError, pa.ArrowException, ValueError, KeyError) as error:
         raise DamagedError(" ".join(str(error).split())[:120] or type(error).__name__) from error
 
@@ -133,7 +133,7 @@ def _bytes_of(path: Path) -> bytes:
 
 def read_part(path: Path) -> Part:
     """A file of flights. DamagedError where it is not as it was written; which row, where a row was altered."""
-    table = read_checked(path)
+    table = _read_checked(path)
     if DIGEST not in table.column_names or BEFORE not in (table.schema.metadata or {}):
         raise DamagedError("its rows have no digests")
     before = _before(table.schema.metadata[BEFORE])

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaigns.chain import DIGEST, DamagedError, read_checked, read_part, write_part
+from flownav.campaigns.chain import DamagedError, read_part, write_part
 from flownav.campaigns.measures import ROW_COLUMNS, measured
 from flownav.campaigns.plan import Plan
 from flownav.core import arrow_columns
@@ -207,12 +207,12 @@ class Dataset:
         return self.rows(cell)[:, : len(SCORE_COLUMNS)]
 
     def _read(self, path: Path, columns: list[str] | None) -> Any:
-        """A file's columns; all but the digests where none are named. InputError where it is damaged."""
+        """A file's columns; all but the digests where none are named. InputError where it is not as it was written."""
         try:
-            table = read_checked(path, columns)
+            table = read_part(path).table
         except DamagedError as error:
             raise InputError(f"{path}: is damaged ({error}); the command that flew it flies it again") from None
-        return table if columns is not None or DIGEST not in table.column_names else table.drop_columns([DIGEST])
+        return table if columns is None else table.select(columns)
 
 
 def rows_of_table(table: Any) -> Array:

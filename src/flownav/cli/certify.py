@@ -65,7 +65,8 @@ def command(
 ) -> None:
     """Fly what a requirement asks for: pass, fail or not shown, with its risk; exit status 1 unless it passes.
 
-    With --verify a certificate is held against its folder instead, and exit status 1 says that it does not hold.
+    With --verify a certificate is held against its folder instead, and exit status 1 says that it does not hold, or
+    that its flights could not be flown again.
     """
     from flownav.campaigns.certification.cells import plan_of
     from flownav.campaigns.certification.certify import FLIGHTS_TOLD
@@ -89,11 +90,13 @@ def command(
     require_between("--records", records, 0, FLIGHTS_TOLD)
     require_engine(engine)
     asked = load_requirement(requirement)
+    plan = plan_of(asked, flights, vehicle)
     if plan_only:
+        for cell in range(len(plan.cells)):
+            plan.ready(cell)  # what cannot be flown is refused here, as it is without --plan
         _say_plan(asked, as_json)
         return
     signer = None if sign is None else private_key(sign)
-    plan = plan_of(asked, flights, vehicle)
     folder = out or Path("out") / f"{asked.name}_certificate"
     how = How(engine_named(engine), ranking, records, again, signer)
     facts = _fly(asked, plan, how, requirement, folder)
@@ -153,9 +156,8 @@ def _verify(folder: Path, requirement: str | None, again: int, key: Path | None,
     facts = found.as_json()
     said = f"{facts['verification'].upper()}  {facts['requirement']}, certified as: {facts['verdict']}"
     answer(facts, as_json, lambda: say(said, table_of(CHECKED, facts["checks"], left=3), wide=WIDE))
-    if not found.holds:
-        wrong = [f"{check.what}: {check.said}" for check in found.checks if check.found == "does not hold"]
-        raise VerdictError(f"{folder}: {'; '.join(wrong)}")
+    if found.wrong:
+        raise VerdictError(f"{folder}: {'; '.join(found.wrong)}")
 
 
 def _say_plan(asked: Requirement, as_json: bool) -> None:

@@ -120,5 +120,6 @@ def _is_our_page(head: bytes) -> bool:
     lower = head.lower()
     if b"<html" not in lower:
         return False
-    end = min((lower.find(mark) for mark in HEAD_ENDS if mark in lower), default=len(head))
-    return PAGE_MARK.encode() in head[:end]
+    start, end = lower.find(b"<head"), min((lower.find(mark) for mark in HEAD_ENDS if mark in lower), default=len(head))
+    place = head.find(PAGE_MARK.encode(), max(start, 0), end)
+    return 0 <= start < place and b"<!--" not in head[:place]  # in a comment somebody only speaks of it

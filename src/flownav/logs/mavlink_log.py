@@ -25,6 +25,7 @@ from flownav.logs.mavlink.said import Said
 from flownav.logs.mavlink.sensor_messages import range_limits_m
 from flownav.logs.mavlink_streams import Gathered, Source
 from flownav.logs.plausible import of_one_clock
+from flownav.logs.references import listed, of_one_origin
 
 AUTOPILOTS = {ARDUPILOT: "ArduPilot", PX4: "PX4"}
 TELLING = ("HEARTBEAT", "STATUSTEXT", "PARAM_VALUE")
@@ -86,13 +87,14 @@ class Flight:
     """What the messages of one vehicle's system tell.
 
     gathered: readings by sensor and source. states: (log time, state) by message name. origin_deg_m, limits: as in
-    Log. counts: messages left out, by what they are; clock jumps.
+    Log. counts: messages left out, by what they are; clock jumps. notes: what was done to the states.
     """
 
     def __init__(self, decoder: Decoder, vehicle: Vehicle, frames: list[Frame]) -> None:
         self.gathered = Gathered()
         self.states: dict[str, list[tuple[float, Any]]] = {name: [] for name in STATES}
         self.counts: Counter[str] = Counter()
+        self.notes: list[str] = []
         self.limits: dict[str, tuple[float, float]] = {}
         self.said, self.asked = Said(vehicle.make), Asked(vehicle.make)
         self._quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
@@ -180,9 +182,25 @@ class Flight:
             return None
         t_s, states = np.array([t for t, _ in found]), [state for _, state in found]
         local = isinstance(states[0], LocalState)
-        position = np.array([state.pos_ned_m for state in states]) if local else self._local(states)
+        position = self._about_one_origin(t_s, states) if local else self._local(states)
         velocity = np.array([state.vel_ned_m_s for state in states])
         return in_order(state_table(t_s, position, velocity, None if attitude is None else attitude_at(attitude, t_s)))
+
+    def _about_one_origin(self, t_s: Array, states: list[LocalState]) -> Array:
+        """Local positions (n, 3) about the first origin where the global ones show that it moved; noted."""
+        position, known = np.array([state.pos_ned_m for state in states]), self.states["GLOBAL_POSITION_INT"]
+        if not known or np.any(np.diff(t_s) < 0.0):
+            return position
+        known_t_s, there = np.array([t for t, _ in known]), [state for _, state in known]
+        order, about = np.argsort(known_t_s, kind="stable"), self.origin_deg_m or there[0].position_deg_m
+        path = local_ned(np.array([state.position_deg_m for state in there]), about)[order]
+        position, moves = of_one_origin(t_s, position, known_t_s[order], path)
+        if moves:
+            self.notes.append(
+                f"LOCAL_POSITION_NED: its origin moved {listed(moves)}, as GLOBAL_POSITION_INT shows; what follows is "
+                "about the first"
+            )
+        return position
 
     def truth(self) -> Table | None:
         """The simulator's truth about the log's origin (about its own first position without one)."""
@@ -259,11 +277,11 @@ def read_tlog(path: Path, *, flow_instance: int | None = None) -> Log:
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     streams, strays = of_one_clock(path, streams.values(), NOTHING)
-    truth = flight.truth()
+    truth, own = flight.truth(), flight.autopilot(streams.get(Sensor.ATTITUDE))
     return Log(
         path, streams, flight.origin_deg_m, truth, {path.name: sha256_of(content)},
-        (*choice, *_damage_notes(damage, frames), *_flight_notes(flight), *chosen, *strays),
-        flight.autopilot(streams.get(Sensor.ATTITUDE)), vehicle.name, flight.limits,
+        (*choice, *_damage_notes(damage, frames), *_flight_notes(flight), *flight.notes, *chosen, *strays),
+        own, vehicle.name, flight.limits,
         tuple(absences_of(streams, **LACKING)), clock_start_s=0.0, truth_name=SIMULATOR,
         parameters=flight.parameters, happened=flight.said.happened(),
         setpoints=flight.asked.setpoints(), battery=flight.asked.battery(),

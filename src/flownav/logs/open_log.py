@@ -1,6 +1,7 @@
 """Any recorded flight as a Log: what a path holds is told from its first bytes, its reader is imported then."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from flownav.logs.dataflash.text_form import is_text
 from flownav.logs.journal import MAGIC as JOURNAL_MAGIC
 from flownav.logs.journal import SUFFIX as JOURNAL_SUFFIX
 from flownav.logs.log import Log
+from flownav.logs.references import examined, upside_down
 
 KNOWN = (
     "a folder of CSV files, a PX4 ULog (.ulg), an ArduPilot DataFlash log (.bin), a MAVLink telemetry log (.tlog), a "
@@ -38,11 +40,23 @@ YEARS_US = (1.0e15, 4.2e15)  # microseconds of the years 2001 to 2103
 
 
 def open_log(path: Path, *, flow_instance: int | None = None, topics: Mapping[str, str] | None = None) -> Log:
-    """Read a recorded flight of any known format.
+    """Read a recorded flight of any known format; of its reference, strays are left out and leaps taken back, and said.
 
     flow_instance: which of several flow sensors; None takes the one with most to say. topics: of a ROS bag, which
     topic serves as what, by role. InputError where the path is missing or no known format, or the log cannot be read.
     """
+    log = _read(path, flow_instance, topics)
+    if log.truth is None:
+        return log
+    if witness := upside_down(log.truth, log.streams):
+        note = f"{log.truth_name} is left out: its down points up, as {witness} shows; give it with z downwards"
+        return replace(log, truth=None, heading_truth=None, notes=(*log.notes, note))
+    truth, notes = examined(log.truth, log.truth_name)
+    return replace(log, truth=truth, notes=(*log.notes, *notes)) if notes else log
+
+
+def _read(path: Path, flow_instance: int | None, topics: Mapping[str, str] | None) -> Log:
+    """A log as its reader makes it."""
     from flownav.logs.ros.containers import is_bag_folder
 
     folder = an_input(path).is_dir()

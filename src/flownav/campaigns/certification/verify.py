@@ -35,6 +35,7 @@ Found = Literal["holds", "does not hold", "not checked"]
 MOST_FACTS_BYTES = 256 << 20
 MADE_ANEW = ("worst", "flown_again")  # facts that hold more than what the rows alone say
 RANKING_KEYS = ("ranking", "split")
+NEEDED = ("plan", "figures", "flights flown again")  # without these a folder can say whatever its maker likes
 NOT_LOOKED_AT = (
     ("flights of the ranking", "their outcomes are held by their hashes; they are not flown again"),
     ("records of the worst flights", "they are held by their hashes; `flownav report` reads them"),
@@ -70,9 +71,20 @@ class Verification:
         self.checks.append(Check(what, "not checked", why))
 
     @property
-    def holds(self) -> bool:
-        """Whether nothing that was looked at is wrong."""
-        return all(check.found != "does not hold" for check in self.checks)
+    def verification(self) -> str:
+        """Whether it holds; "not shown" where nothing is wrong, but flights or figures could not be looked at."""
+        if any(check.found == "does not hold" for check in self.checks):
+            return "does not hold"
+        shown = {check.what for check in self.checks if check.found == "holds"}
+        return "holds" if shown >= set(NEEDED) else "not shown"
+
+    @property
+    def wrong(self) -> list[str]:
+        """What does not hold; of what is not shown, why it could not be looked at."""
+        if self.verification == "not shown":
+            return [f"{check.what}: not checked: {check.said}" for check in self.checks
+                    if check.found == "not checked" and set(check.what.split(", ")) & set(NEEDED)]  # fmt: skip
+        return [f"{check.what}: {check.said}" for check in self.checks if check.found == "does not hold"]
 
     def as_json(self) -> dict[str, Any]:
         """The checks as `flownav certify --verify --json` prints them."""
@@ -82,7 +94,7 @@ class Verification:
             "requirement": said.get("name") if isinstance(said, dict) else None,
             "verdict": self.facts.get("verdict"),
             "flights": self.facts.get("flights"),
-            "verification": "holds" if self.holds else "does not hold",
+            "verification": self.verification,
             "checks": [check._asdict() for check in self.checks],
         }
 
@@ -120,7 +132,7 @@ def _look(
             _flights(made, certificate, engine, sample, on_progress)
             _ranking(made, certificate)
             _page(made, certificate)
-        else:
+        elif ours:
             made.leave("flights flown again, page", "they could only be others than those that stand here")
     else:
         made.leave("plan, figures, flights flown again", "the requirement's file is not there; name it as well")

@@ -28,6 +28,9 @@ SIGNED_VB, UNSIGNED_VB, NEG_14BIT, TAG8_8SVB, TAG2_3S32, TAG8_4S16, NONE, TAG2_3
 AT_MOST = 8  # values that one encoding packs together
 
 
+LARGEST_SETTING = 2147483647.0  # of a flight controller's own 32 bits
+
+
 @dataclass(frozen=True, eq=False)
 class Fields:
     """The fields of one kind of frame: names, and for each what it is predicted from and how the rest is packed."""
@@ -64,14 +67,16 @@ class Header:
         return "INAV" in self.settings.get("Firmware revision", "").upper()
 
     def number(self, name: str, default: float) -> float:
-        """A setting's first number; `default` where it is missing or none."""
+        """A setting's first number; `default` where it is missing, or none that a setting can be."""
         text = self.settings.get(name, "").split(",")[0].strip()
         try:
             if text.lower().startswith("0x"):
-                return float(struct.unpack("<f", struct.pack("<I", int(text, 16) & 0xFFFFFFFF))[0])
-            return float(text)
+                found = float(struct.unpack("<f", struct.pack("<I", int(text, 16) & 0xFFFFFFFF))[0])
+            else:
+                found = float(text)
         except ValueError:
             return default
+        return found if abs(found) <= LARGEST_SETTING else default  # NaN is not
 
 
 def headers(content: bytes) -> list[Header]:

@@ -42,7 +42,7 @@ class _Walk:
         self.schemas: dict[int, tuple[str, str, str]] = {}
         self.channels: dict[int, Channel] = {}
         self.taken: set[int] = set()
-        self.lost = 0
+        self.lost, self.unpacking = 0, False
 
     def records(self, content: Any, start: int, end: int) -> Iterator[Message]:
         """The messages among the records from `start` to `end`. Damage where a record reaches beyond."""
@@ -83,8 +83,14 @@ class _Walk:
                 _, _, name, _, data = _fields(record, "QQSSL")
                 self.bag.attachments.setdefault(name, data)
             elif kind == CHUNK:
+                if self.unpacking:
+                    raise Damage("a chunk in a chunk")
                 unpacked = _unpacked(record)
-                yield from self.records(unpacked, 0, len(unpacked))
+                self.unpacking = True
+                try:
+                    yield from self.records(unpacked, 0, len(unpacked))
+                finally:
+                    self.unpacking = False
         except (Damage, struct.error, UnicodeDecodeError):
             self.lost += 1
 

@@ -98,6 +98,10 @@ def read_ros(path: Path, *, flow_instance: int | None = None, topics: Mapping[st
     if not gathered:
         kinds = sorted({one_line(f"{channel.topic} ({channel.kind})") for channel in bag.channels})
         listed = ", ".join(kinds[:TOPICS_SHOWN]) + (" ..." if len(kinds) > TOPICS_SHOWN else "") or "nothing"
+        if bag.notes:
+            raise InputError(
+                f"{path}: no message can be read ({one_line(bag.notes[0]).partition(';')[0]}); copy it again"
+            )
         why = f"; of {', '.join(sorted(decoder.undefined))} it lacks the definition" if decoder.undefined else ""
         raise InputError(f"{path}: no message of a known type{why}; the bag holds {listed}")
     inputs = {file.name: hash_of(file) for file in files}

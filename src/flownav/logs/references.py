@@ -1,0 +1,156 @@
+"""Is a log's reference one path in one frame? Rows that cannot be are left out, leaps taken back, and both are said.
+
+A tracker mistakes a marker, a simulator sets its vehicle elsewhere, visual odometry starts anew: one row at 50 km is
+not an error of 700 m rms of whatever is held against it. The path goes on where it was; what it does within each piece
+is scored as it is.
+"""
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.core.measurement import Array, Sensor, Stream
+from flownav.core.record import POSITION_NED, Table
+
+FARTHEST_M = 1e5  # from a local origin
+LEAST_LEAP_M, LEAST_LEAP_M_S = 0.5, 20.0  # more than its own motion makes it, and that much per time
+LEAST_PIECE_S = 1.0  # what is shorter is a stray
+STEPS = 5  # whose median is the motion before a leap
+MOST_STRAYS = 0.2  # of the rows; with more nothing is known of which are right
+LEAST_MOVE_M, LEAST_ROWS = 1.0, 10  # of an origin; rows before and after
+LEAST_HEIGHTS, LEAST_CLIMB_M, LEAST_LIKENESS = 50, 0.3, 0.9  # readings; rms; correlation that shows up from down
+SHOWN = 3
+
+
+def upside_down(truth: Table, streams: Mapping[Sensor, Stream]) -> str:
+    """Which sensor of height shows that a reference's down points up; "" where none does."""
+    t_s, up_m = np.asarray(truth["t_s"], float), -np.asarray(truth[POSITION_NED[2]], float)
+    for sensor in (Sensor.BARO, Sensor.RANGE):
+        stream = streams.get(sensor)
+        if stream is None:
+            continue
+        at_s, height_m = stream.t_s - stream.delay_s, stream.value[:, 0]
+        inside = (
+            (at_s >= t_s[0]) & (at_s <= t_s[-1]) & np.isfinite(height_m) & ((height_m > 0.0) | (sensor != Sensor.RANGE))
+        )
+        if np.count_nonzero(inside) < LEAST_HEIGHTS:
+            continue
+        ours, theirs = np.interp(at_s[inside], t_s, up_m), height_m[inside]
+        if min(ours.std(), theirs.std()) < LEAST_CLIMB_M:
+            continue
+        if float(np.corrcoef(ours, theirs)[0, 1]) < -LEAST_LIKENESS:
+            return sensor.name.lower()
+    return ""
+
+
+class Leap(NamedTuple):
+    """When a path leaps [s], and by what beside its own motion, north, east, down [m]."""
+
+    t_s: float
+    by_ned_m: Array
+
+
+def examined(truth: Table, name: str) -> tuple[Table, tuple[str, ...]]:
+    """A reference without strays and leaps, and a note on each kind; the table itself where there are none.
+
+    truth: columns t_s and POSITION_NED at least, in order of time. name: of the reference, for the notes.
+    """
+    t_s = np.asarray(truth["t_s"], float)
+    position = np.column_stack([np.asarray(truth[column], float) for column in POSITION_NED])
+    possible = np.isfinite(position).all(axis=1) & (np.abs(position) <= FARTHEST_M).all(axis=1)
+    kept = possible & ~_short_pieces(t_s, position, possible)
+    strays = np.flatnonzero(~kept)
+    if len(strays) > MOST_STRAYS * len(t_s):
+        return truth, (f"{name} leaps about ({len(strays)} of its {len(t_s)} rows): errors against it mean little",)
+    table: Table = truth if not len(strays) else {key: np.asarray(column)[kept] for key, column in truth.items()}
+    leaps = leaps_of(t_s[kept], position[kept])
+    for leap in leaps:
+        later = np.asarray(table["t_s"], float) >= leap.t_s
+        table = table | {
+            column: np.where(later, np.asarray(table[column], float) - by, table[column])
+            for column, by in zip(POSITION_NED, leap.by_ned_m, strict=True)
+        }
+    return table, (*_of_strays(name, t_s[strays]), *_of_leaps(name, leaps))
+
+
+def leaps_of(t_s: Array, position: Array) -> list[Leap]:
+    """Where a path (n,), (n, 3) leaps. Rows that repeat the place before them are copies, or stand."""
+    new = np.flatnonzero(np.concatenate([[True], (np.diff(position, axis=0) != 0.0).any(axis=1)]))
+    if len(t_s) < 2 or len(new) < 2:
+        return []
+    at, path = t_s[new], position[new]
+    step = np.diff(path, axis=0)
+    usual_s = float(np.median(np.diff(at)))  # between places: of copies longer than between rows
+    since_s = np.maximum(t_s[new[1:]] - t_s[new[1:] - 1], usual_s)  # what hides for a while may have moved meanwhile
+    step_s = np.maximum(np.minimum(np.diff(at), since_s), 1e-6)
+    found: list[Leap] = []
+    speed = step / step_s[:, None]
+    for place in np.flatnonzero(np.linalg.norm(speed, axis=1) >= LEAST_LEAP_M_S):
+        before = speed[max(place - STEPS, 0) : place]
+        after = speed[place + 1 : place + 1 + STEPS]
+        motions = [np.median(one, axis=0) for one in (before, after) if len(one)] or [np.zeros(3)]
+        beyond = min((step[place] - motion * step_s[place] for motion in motions), key=lambda by: float(by @ by))
+        size = float(np.linalg.norm(beyond))
+        if size >= LEAST_LEAP_M and size >= LEAST_LEAP_M_S * step_s[place]:
+            found.append(Leap(float(at[place + 1]), beyond))
+    return found
+
+
+def of_one_origin(t_s: Array, local: Array, known_t_s: Array, known: Array) -> tuple[Array, list[Leap]]:
+    """A local path (n,), (n, 3) about its first origin, and when and by what that moved.
+
+    known_t_s (m,), known (m, 3): the same estimate about an origin that does not move. Where the two part from one row
+    to the next and stay apart, it is the origin that has moved.
+    """
+    path, found = local.copy(), list[Leap]()
+    covered = np.flatnonzero((t_s >= known_t_s[0]) & (t_s <= known_t_s[-1])) if len(known_t_s) else np.zeros(0, int)
+    if len(covered) < 2 * LEAST_ROWS:
+        return path, found
+    there = np.column_stack([np.interp(t_s[covered], known_t_s, column) for column in known.T])
+    apart = local[covered] - there
+    for place in np.flatnonzero(np.linalg.norm(np.diff(apart, axis=0), axis=1) >= LEAST_MOVE_M) + 1:
+        before, after = apart[max(place - LEAST_ROWS, 0) : place], apart[place : place + LEAST_ROWS]
+        by = np.median(after, axis=0) - np.median(before, axis=0)
+        if min(len(before), len(after)) >= LEAST_ROWS and float(np.linalg.norm(by)) >= LEAST_MOVE_M:
+            found.append(Leap(float(t_s[covered[place]]), by))
+            path[covered[place] :] -= by
+    return path, found
+
+
+def _short_pieces(t_s: Array, position: Array, possible: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The rows of pieces between leaps, and before and after them, that are too short to be told of."""
+    short = np.zeros(len(t_s), bool)
+    leaps = [leap.t_s for leap in leaps_of(t_s[possible], position[possible])]
+    edges = [-np.inf, *leaps, np.inf] if leaps else []
+    for first, last in pairwise(edges):
+        inside = (t_s >= first) & (t_s < last)
+        if inside.any() and t_s[inside][-1] - t_s[inside][0] < LEAST_PIECE_S:
+            short |= inside
+    return short
+
+
+def _of_strays(name: str, strays_s: Array) -> tuple[str, ...]:
+    if not len(strays_s):
+        return ()
+    rows = "one row is" if len(strays_s) == 1 else f"{len(strays_s)} rows are"
+    return (f"{name}: {rows} far from the others and left out, at {_times(strays_s)}",)
+
+
+def _of_leaps(name: str, leaps: list[Leap]) -> tuple[str, ...]:
+    if not leaps:
+        return ()
+    return (f"{name} leaps {listed(leaps)}; what follows is shifted back, and each piece is scored as it is",)
+
+
+def listed(leaps: Sequence[Leap]) -> str:
+    """By how much, and when."""
+    sizes = ", ".join(f"by {float(np.linalg.norm(leap.by_ned_m)):.3g} m at {leap.t_s:.2f} s" for leap in leaps[:SHOWN])
+    return sizes + (f" and {len(leaps) - SHOWN} times more" if len(leaps) > SHOWN else "")
+
+
+def _times(t_s: Array) -> str:
+    shown = ", ".join(f"{one:.2f}" for one in t_s[:SHOWN].tolist())
+    return f"{shown} s" + (" and later" if len(t_s) > SHOWN else "")

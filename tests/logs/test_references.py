@@ -1,0 +1,117 @@
+"""A reference that is not one path in one frame: strays and leaps are named with their times, and taken back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flownav.core.measurement import Sensor, Stream
+from flownav.core.record import POSITION_NED
+from flownav.logs.open_log import open_log
+from flownav.logs.references import examined, upside_down
+from replay_logs import log_of_flight
+
+T_S = np.arange(0.0, 40.0, 0.1)
+PATH = np.column_stack([10.0 * np.sin(0.3 * T_S), 4.0 * T_S, -1.0 - 0.1 * T_S])
+
+
+def table(position, t_s=T_S):
+    return {"t_s": t_s} | dict(zip(POSITION_NED, position.T, strict=True))
+
+
+def path_of(truth):
+    return np.column_stack([truth[name] for name in POSITION_NED])
+
+
+def changed(rows, by):
+    position = PATH.copy()
+    position[rows] += by
+    return position
+
+
+def test_a_reference_that_is_whole_is_left_alone():
+    truth = table(PATH)
+    assert examined(truth, "x") == (truth, ())
+
+
+@pytest.mark.parametrize("by", [3e38, np.nan, 5e4, -30.0])
+@pytest.mark.parametrize("row", [0, 200, len(T_S) - 1])
+def test_a_row_that_cannot_be_is_left_out_and_named_with_its_time(by, row):
+    truth, notes = examined(table(changed(row, by)), "truth.csv")
+    assert np.array_equal(path_of(truth), np.delete(PATH, row, axis=0))
+    assert notes == (f"truth.csv: one row is far from the others and left out, at {T_S[row]:.2f} s",)
+
+
+def test_some_rows_that_are_elsewhere_are_left_out_together():
+    truth, notes = examined(table(changed(slice(100, 105), [25.0, 0.0, 0.0])), "the simulator")
+    assert len(truth["t_s"]) == len(T_S) - 5
+    assert notes[0].endswith("5 rows are far from the others and left out, at 10.00, 10.10, 10.20 s and later")
+
+
+def test_a_leap_is_named_and_what_follows_is_shifted_back():
+    truth, notes = examined(table(changed(slice(200, None), [20.0, 10.0, 0.0])), "truth.csv")
+    assert np.abs(path_of(truth) - PATH).max() < 0.15  # a tenth of a second at 4 m/s, of which the motion is known
+    assert notes == (
+        "truth.csv leaps by 22.4 m at 20.00 s; what follows is shifted back, and each piece is scored as it is",
+    )
+
+
+def test_two_leaps_and_a_stray():
+    position = changed(slice(100, None), [5.0, 0.0, 0.0])
+    position[300:] -= [0.0, 8.0, 0.0]
+    position[50] = 1e9
+    truth, notes = examined(table(position), "x")
+    assert np.abs(path_of(truth) - np.delete(PATH, 50, axis=0)).max() < 0.3
+    assert notes[0] == "x: one row is far from the others and left out, at 5.00 s"
+    assert notes[1].startswith("x leaps by 4.99 m at 10.00 s, by 8 m at 30.00 s;")
+
+
+def test_fast_flight_gaps_and_copies_are_no_leaps():
+    """60 m/s; an occlusion of 5 s; a tracker of 10 Hz logged at 200 Hz."""
+    fast = table(np.column_stack([60.0 * T_S, 0.0 * T_S, 0.0 * T_S]))
+    assert not examined(fast, "x")[1]
+    hidden = (T_S < 10.0) | (T_S > 15.0)
+    assert not examined(table(PATH[hidden], T_S[hidden]), "x")[1]
+    often = np.arange(0.0, 40.0, 0.005)
+    held = PATH[np.minimum((often * 10.0 + 1e-9).astype(int), len(PATH) - 1)]
+    assert not examined(table(held, often), "x")[1]
+
+
+def test_one_that_leaps_about_is_left_as_it_is_and_said():
+    truth = table(PATH + 50.0 * (np.arange(len(T_S)) % 4 < 2)[:, None])
+    found, notes = examined(truth, "x")
+    assert found is truth
+    assert notes[0].startswith("x leaps about (")
+
+
+def test_a_log_says_it_and_has_the_path(tmp_path):
+    made = log_of_flight(10.0)
+    every = slice(None, None, 100)
+    position = made.position[every].copy()
+    position[40:] += [20.0, 10.0, 0.0]
+    made.tables["truth"] = {"t_s": made.t_s[every]} | dict(zip(("x_m", "y_m", "z_m"), position.T, strict=True))
+    log = open_log(made.write(tmp_path / "log"))
+    assert np.abs(path_of(log.truth) - made.position[every]).max() < 0.1
+    assert any(note.startswith("truth.csv leaps by 22.4 m at ") for note in log.notes)
+
+
+@pytest.mark.parametrize("left", ["baro", "range"])
+def test_a_reference_whose_down_points_up_is_left_out(tmp_path, left):
+    made = log_of_flight(20.0)
+    every = slice(None, None, 100)
+    place = dict(zip(("x_m", "y_m", "z_m"), made.position[every].T, strict=True))
+    for name in {"baro", "range"} - {left}:
+        del made.tables[name]
+    made.tables["truth"] = {"t_s": made.t_s[every]} | place
+    assert open_log(made.write(tmp_path / "right")).truth is not None
+    made.tables["truth"]["z_m"] = -place["z_m"]
+    log = open_log(made.write(tmp_path / "wrong"))
+    assert log.truth is None
+    assert f"truth.csv is left out: its down points up, as {left} shows; give it with z downwards" in log.notes
+
+
+def test_without_a_climb_nothing_is_told_of_down():
+    still = table(PATH * [1.0, 1.0, 0.0])
+    streams = {Sensor.BARO: Stream.of(Sensor.BARO, T_S, 0.01 * np.random.default_rng(1).normal(size=(len(T_S), 1)))}
+    assert upside_down(still, streams) == ""
+    assert upside_down(table(PATH), {}) == ""

@@ -12,6 +12,7 @@ from flownav.core.record import VELOCITY_BODY
 from flownav.lab.identification.first_look import IN_PART, Look, first_look
 from flownav.lab.identification.flight import jumps
 from flownav.lab.identification.own_gyro import own_gyro
+from flownav.lab.identification.range_truth import untrue
 from flownav.logs.log import Log, attitude_at
 from flownav.logs.plausible import check_plausible
 from flownav.replays.judged import autopilot_scores, flying_at, obstacles
@@ -197,8 +198,9 @@ def _of_range(log: Log) -> list[Finding]:
     aloft = flying_at(log, stream.t_s - stream.delay_s) & (stream.value[:, 0] > 0.0)
     t_s, range_m = stream.t_s[aloft], stream.value[aloft, 0]
     share, doubt = jumps(t_s, range_m)
+    told = [Finding(line) for line in untrue(log, aloft).said]
     if share < LEAST_JUMPING:
-        return []
+        return told
     largest = float(np.abs(np.diff(range_m)).max())
     jumping = f"range jumps in {share:.0%} of its steps in flight, by up to {largest:.1f} m"
-    return [Finding(f"{jumping}: velocities from flow and range are off by {doubt:.0%} or so")]
+    return [*told, Finding(f"{jumping}: velocities from flow and range are off by {doubt:.0%} or so")]

@@ -3,14 +3,16 @@
 The quick part of an identification, for `flownav info`.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from flownav.core.measurement import Array, Sensor
 from flownav.lab.identification import reference_motion
-from flownav.lab.identification.flight import IMU_NAME, Flight, flight
+from flownav.lab.identification.flight import IMU_NAME, LEAST_FLOW, Flight, flight
 from flownav.lab.identification.own_gyro import ALIKE_WITHIN
+from flownav.lab.identification.reference_truth import in_one_piece, without_leaps_and_stands
 from flownav.logs.log import Log, mean_over
 
 CLEAR_RATIO = 2.0  # the best assignment must explain this much more than the next
@@ -104,7 +106,12 @@ def judged(log: Log, reference: str = "auto") -> Judged:
 
 
 def _judged(flown: Flight) -> Judged:
+    flown, leaps = without_leaps_and_stands(flown)
     moved = reference_motion.motion(flown)
+    piece, turns = in_one_piece(flown, moved)
+    if turns and np.count_nonzero(piece.good) >= LEAST_FLOW:
+        flown, moved = piece, reference_motion.motion(piece)
+    flown = replace(flown, notes=(*flown.notes, *(f"the reference: {line}" for line in (*leaps, *turns))))
     tie = moved.flow_tie
     age_s = tie.delay_s.value if tie is not None and tie.holds else flown.age_s
     response = reference_motion.velocity_response(flown, moved, age_s)

@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.measurement import Array
-from flownav.lab.identification.flight import Flight
+from flownav.lab.identification.flight import LEAST_FLOW, Flight
 from flownav.lab.identification.reference_motion import Motion, on_grid
 from flownav.logs.log import mean_over
 
-LEAP_M, FASTEST_M_S = 1.0, 20.0
+LEAP_M, FASTEST_M_S, TIMES_THE_USUAL = 1.0, 20.0, 6.0
 STANDS_S, MOVING_M_S, BESIDE_S = 1.5, 0.3, 1.0
 BLOCK_S, LEAST_PIECE_S, LEAST_BLOCKS = 1.0, 12.0, 24
 DRIFT_M_S, TURN_RAD = 0.25, 0.2  # from which on a piece differs from the other
@@ -41,14 +41,17 @@ def without_leaps_and_stands(flown: Flight) -> Mended:
             said.append(f"{flown.reference_name} stands still from {begin:.1f} to {end:.1f} s while the flow moves")
             ends.append(end)
     step = np.diff(place, axis=0)
-    far = np.linalg.norm(step, axis=1) > LEAP_M + FASTEST_M_S * np.minimum(np.diff(t_s), 1.0)
+    long = np.linalg.norm(step, axis=1)  # of a noisy reference every step is
+    far = long > LEAP_M + FASTEST_M_S * np.minimum(np.diff(t_s), 1.0) + TIMES_THE_USUAL * float(np.median(long))
     for row in np.flatnonzero(far):
         place = np.concatenate([place[: row + 1], place[row + 1 :] - step[row]])
         if not any(abs(t_s[row + 1] - end) < BESIDE_S for end in ends):
             size = float(np.linalg.norm(step[row]))
             said.append(f"{flown.reference_name} leaps by {size:.1f} m at {t_s[row + 1]:.1f} s")
             good &= np.abs(flown.t_s - t_s[row]) > 0.5 * BESIDE_S
-    return Mended(replace(flown, good=good, reference_m=place) if said else flown, tuple(said))
+    if not said or np.count_nonzero(good) < LEAST_FLOW:
+        return Mended(flown, ())
+    return Mended(replace(flown, good=good, reference_m=place), tuple(said))
 
 
 def _stands(t_s: Array, place: Array) -> list[tuple[float, float]]:

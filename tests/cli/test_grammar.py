@@ -81,7 +81,7 @@ def test_the_choices_of_the_command_line_are_those_of_the_rooms():
     from flownav.campaigns.faults.catalogue import FAULTS
     from flownav.campaigns.plan import SAMPLINGS
     from flownav.export.samples.kinds import KINDS
-    from flownav.lab.identification.autopilot_parameters import AUTOPILOTS
+    from flownav.lab.identification.parameter_file import AUTOPILOTS
     from flownav.lab.identification.quantities import parse_order
     from flownav.lab.optics.camera import LIGHTS
     from flownav.lab.optics.firmware import firmware_named
@@ -97,7 +97,7 @@ def test_the_choices_of_the_command_line_are_those_of_the_rooms():
     assert tuple(SHIPPED_NAMES) == choices.VEHICLES
     assert tuple(SAMPLINGS) == choices.SAMPLINGS
     assert tuple(FAULTS) == choices.FAULTS
-    assert set(choices.AUTOPILOTS) == set(AUTOPILOTS)
+    assert tuple(AUTOPILOTS) == choices.SCALED_FLOW
     assert tuple(SENDINGS) == choices.SENDINGS
     assert set(choices.LIGHTS) == set(LIGHTS)
     assert choices.PATTERNS == PATTERNS

@@ -315,6 +315,11 @@ def test_a_real_log_of_two_flow_sensors(data_folder):
      "0.06 s behind GPS (lag -0.06 s, scale 0.88)"),
     (0.0, 1.2, "flow and GPS agree in shape, not in size and time: the flow reads 20 % too much "
      "(lag 0.00 s, scale 1.20)"),
+    (0.0, 0.44, "flow and GPS do not agree in size: alike in shape (correlation 0.97), the flow reads 56 % too little "
+     "(lag 0.00 s, scale 0.44)"),
 ])  # fmt: skip
 def test_flow_that_differs_in_size_and_time_does_not_simply_agree(lag_s, scale, said):
-    assert Look("GPS", 0.97, lag_s, scale, "axes and signs are right", True, True, 0.0, False).verdict == said
+    look = Look("GPS", 0.97, lag_s, scale, "axes and signs are right", True, True, 0.0, False)
+    assert look.verdict == said
+    assert look.agrees == (0.8 <= scale <= 1.25)
+    assert not look._replace(correlation=0.89).agrees

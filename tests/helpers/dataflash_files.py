@@ -6,7 +6,7 @@ import struct
 
 import numpy as np
 
-from flownav.export.samples.dataflash import FMT, STRUCT
+from flownav.export.samples.dataflash import FMT, STRUCT, gps_time
 from flownav.export.samples.dataflash import HEAD as HEAD
 from flownav.export.samples.dataflash import DataFlashWriter as DataFlashWriter
 from flownav.export.samples.dataflash import define_flight as define_flight
@@ -34,7 +34,8 @@ def blank(codes: str) -> bytes:
 def _gps(writer: DataFlashWriter, time_us: int, row: list[float]) -> None:
     fix, latitude, longitude, altitude, north, east, down = row
     course = np.degrees(np.arctan2(east, north)) % 360.0
-    writer.put("GPS", time_us, 0, fix, latitude, longitude, altitude, np.hypot(north, east), course, down, 1)
+    speed = np.hypot(north, east)
+    writer.put("GPS", time_us, 0, fix, *gps_time(time_us), latitude, longitude, altitude, speed, course, down, 1)
     writer.put("GPA", time_us, 0, 0.5, 0.8, 0.2, 1)
 
 

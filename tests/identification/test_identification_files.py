@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +23,8 @@ from flownav.lab.identification.findings import Findings
 from flownav.lab.identification.first_look import judge
 from flownav.lab.identification.height_law import QualityPoint, compare_schedules, paper_sigma, variance_by_quality
 from flownav.lab.identification.job import identify
-from flownav.lab.identification.quantities import CANDIDATES
+from flownav.lab.identification.own_gyro import OwnGyro
+from flownav.lab.identification.quantities import CANDIDATES, Interval
 from flownav.lab.identification.rig_log import rate_of, read_runs
 from flownav.lab.identification.sensor_file import bessel, sensor_entries, write_sensor
 from flownav.sensors.datasheet import load_sensor
@@ -249,7 +251,7 @@ def test_a_number_of_all_its_digits_reads_back_to_the_bit(number):
 
 # -- autopilots ----------------------------------------------------------------------------------------------------
 def by_name(autopilot, found):
-    return {p.name: p for p in parameters(autopilot, found, load_sensor())}
+    return {p.name: p for p in parameters(autopilot, found)}
 
 
 def test_px4s_parameters_are_the_findings_in_its_units(found):
@@ -258,11 +260,67 @@ def test_px4s_parameters_are_the_findings_in_its_units(found):
     worst = max(point.sigma_m_s / point.height_m for point in found.noise.points)
     assert p["EKF2_OF_N_MIN"].value == pytest.approx(max(0.05, worst))
     assert p["EKF2_OF_N_MAX"].value >= p["EKF2_OF_N_MIN"].value
-    assert p["EKF2_OF_QMIN"].value == 255
-    assert (p["SENS_FLOW_MINHGT"].value, p["SENS_FLOW_MAXHGT"].value) == (0.05, 3.5)
+    assert all(any(digit in p.reason for digit in "0123456789") for p in p.values())
+
+
+def test_a_limit_is_the_datasheets_and_never_what_one_flight_reached(found):
+    limits = ("SENS_FLOW_MINHGT", "SENS_FLOW_MAXHGT", "SENS_FLOW_MAXR")
+    assert not {*limits, "EKF2_OF_QMIN"} & by_name("px4", found).keys()
+    why = dict(left_out("px4", found))
+    assert {"EKF2_OF_QMIN", *limits} == why.keys()
+    assert "datasheet" in why["SENS_FLOW_MAXR"]
+    sheet = load_sensor()
+    p = by_name("px4", replace(found, max_flow_rad_s=20.0, datasheet=sheet))
+    assert [p[name].value for name in limits] == [0.05, 3.5, sheet.limits.max_flow_rad_s]
     assert "SENS_FLOW_MINRNG" in p["SENS_FLOW_MINHGT"].reason
     assert "EKF2_OF_RMAX" in p["SENS_FLOW_MAXR"].reason
-    assert all(any(digit in p.reason for digit in "0123456789") for p in p.values())
+
+
+def told_gain(found, value, low, high, **changes):
+    """The findings with another gain."""
+    return replace(found, responses=(replace(found.responses[0], gain=Interval(value, low, high)),), **changes)
+
+
+@pytest.mark.parametrize(("autopilot", "name", "was", "value"), [
+    ("px4", "SENS_FLOW_SCALE", {}, 1.0 / 0.877),
+    ("px4", "SENS_FLOW_SCALE", {"SENS_FLOW_SCALE": 1.1}, 1.1 / 0.877),
+    ("inav", "opflow_scale", {}, 10.5 * 0.877),
+    ("inav", "opflow_scale", {"opflow_scale": 9.0}, 9.0 * 0.877),
+    ("ardupilot", "FLOW_FYSCALER", {"FLOW_FYSCALER": 100.0}, 1e3 * (1.1 / 0.877 - 1.0)),
+])  # fmt: skip
+def test_the_factor_of_each_autopilot_undoes_the_gain_beside_what_was_set(found, autopilot, name, was, value):
+    p = by_name(autopilot, told_gain(found, 0.877, 0.873, 0.880, parameters=was))[name]
+    assert p.value == pytest.approx(value, rel=1e-12)
+    low, high = (float(number) for number in re.findall(r"\[(\S+), (\S+)\]", p.reason)[-1])
+    assert low <= round(p.value, 3) <= high
+    assert low < high
+    assert p.needed is None
+
+
+def test_a_value_that_its_range_cuts_says_what_was_needed(found):
+    p = by_name("ardupilot", told_gain(found, 0.45, 0.449, 0.451))["FLOW_FYSCALER"]
+    assert (p.value, round(p.needed)) == (800.0, 1222)
+    assert p.reason.endswith("1222 is needed, cut to the parameter's range of -800 to 800")
+    p = by_name("px4", told_gain(found, 0.45, 0.449, 0.451))["SENS_FLOW_SCALE"]
+    assert (p.value, p.needed) == (1.5, pytest.approx(1.0 / 0.45))
+
+
+def test_one_factor_is_not_written_for_axes_that_differ(found):
+    apart = told_gain(found, 0.9, 0.75, 1.05)
+    assert "SENS_FLOW_SCALE" not in by_name("px4", apart)
+    assert "one factor does not serve them all" in dict(left_out("px4", apart))["SENS_FLOW_SCALE"]
+    assert by_name("px4", told_gain(found, 1.01, 0.97, 1.05))["SENS_FLOW_SCALE"].value == 1.0
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot", "inav"])
+def test_no_factor_is_written_where_the_time_is_wrong(found, autopilot):
+    half = OwnGyro(Interval(0.498, 0.496, 0.5), 0.02, 0.99, 0.0)
+    wrong = told_gain(found, 0.441, 0.439, 0.443, own_gyro=half)
+    assert not {"SENS_FLOW_SCALE", "FLOW_FYSCALER", "opflow_scale"} & by_name(autopilot, wrong).keys()
+    assert any("integration time wrong by 2 (stated too long)" in why for _, why in left_out(autopilot, wrong))
+    own = told_gain(found, 0.95, 0.94, 0.96, own_gyro=half)
+    assert {"SENS_FLOW_SCALE", "FLOW_FYSCALER", "opflow_scale"} & by_name(autopilot, own).keys()
+    assert "the gyro's own scale is wrong by 0.50" in own.gyro_verdict
 
 
 def test_a_worse_quality_raises_px4s_greatest_noise(found):
@@ -303,7 +361,7 @@ def test_a_latency_that_is_not_identifiable_is_not_written_and_the_file_says_so(
     poor = poorly_seen(found, 1)
     assert poor.excitation.identifiable == 1
     assert delay not in by_name(autopilot, poor)
-    write_parameters(tmp_path / "file", autopilot, poor, load_sensor())
+    write_parameters(tmp_path / "file", autopilot, poor, "a sensor")
     text = (tmp_path / "file").read_text()
     assert f"# {delay} is not written: latency: 1 of 3 shown\n" in text
     assert all(line.startswith("#") for line in text.splitlines() if delay in line)
@@ -318,7 +376,7 @@ def test_a_latency_that_is_not_identifiable_is_not_written_and_the_file_says_so(
 def test_a_gain_that_the_log_does_not_show_is_not_written(found, tmp_path, identifiable, unseen, why):
     poor = poorly_seen(found, identifiable, unseen)
     assert "FLOW_FYSCALER" not in by_name("ardupilot", poor)
-    write_parameters(tmp_path / "file", "ardupilot", poor, load_sensor())
+    write_parameters(tmp_path / "file", "ardupilot", poor, "a sensor")
     said = [line for line in (tmp_path / "file").read_text().splitlines() if "FLOW_FYSCALER" in line]
     assert len(said) == 1
     assert said[0].startswith("# FLOW_FYSCALER is not written: gain of velocity x ")
@@ -333,26 +391,26 @@ def test_a_gain_without_unseen_data_is_written_by_its_interval(found):
 
 def test_a_turned_sensor_is_told_how_to_be_set(found, tmp_path):
     turned = replace(found, kind="flight", axes=judge(np.diag([-0.9, -0.9])))
-    write_parameters(tmp_path / "a.param", "ardupilot", turned, load_sensor())
+    write_parameters(tmp_path / "a.param", "ardupilot", turned, "a sensor")
     assert "# set FLOW_ORIENT_YAW to 18000 (180 deg)" in (tmp_path / "a.param").read_text()
-    write_parameters(tmp_path / "p.params", "px4", turned, load_sensor())
+    write_parameters(tmp_path / "p.params", "px4", turned, "a sensor")
     assert "# set SENS_FLOW_ROT to 4 (180 deg)" in (tmp_path / "p.params").read_text()
 
 
 @pytest.mark.parametrize(("autopilot", "fields", "separator"), [("px4", 5, "\t"), ("ardupilot", 2, ",")])
 def test_each_value_has_the_figure_that_it_came_from_above_it(found, tmp_path, autopilot, fields, separator):
-    write_parameters(tmp_path / "file", autopilot, found, load_sensor())
+    write_parameters(tmp_path / "file", autopilot, found, "a sensor")
     lines = (tmp_path / "file").read_text().splitlines()
     values = [i for i, line in enumerate(lines) if not line.startswith("#")]
-    assert len(values) >= 4
+    assert len(values) >= 3
     for i in values:
         assert len(lines[i].split(separator)) == fields
         assert lines[i - 1].startswith("# ")
 
 
 def test_another_autopilot_is_refused(found):
-    with pytest.raises(InputError, match="autopilot betaflight: px4 or ardupilot are possible"):
-        parameters("betaflight", found, load_sensor())
+    with pytest.raises(InputError, match="autopilot betaflight: px4, ardupilot or inav are possible"):
+        parameters("betaflight", found)
 
 
 # -- schedules -----------------------------------------------------------------------------------------------------

@@ -79,8 +79,7 @@ def test_px4_parameters_are_in_a_file_that_a_ground_station_loads(rig):
     assert all(len(row) == 5 and row[:2] == ["1", "1"] and row[4] in ("6", "9") for row in rows)
     values = {row[2]: float(row[3]) for row in rows}
     assert values == facts["autopilot"]
-    assert {"EKF2_OF_CTRL", "EKF2_OF_DELAY", "EKF2_OF_N_MIN", "EKF2_OF_N_MAX", "EKF2_OF_QMIN"} <= set(values)
-    assert {"SENS_FLOW_MINHGT", "SENS_FLOW_MAXHGT", "SENS_FLOW_MAXR"} <= set(values)
+    assert {"EKF2_OF_CTRL", "EKF2_OF_DELAY", "EKF2_OF_N_MIN", "EKF2_OF_N_MAX", "SENS_FLOW_SCALE"} == set(values)
     assert values["EKF2_OF_DELAY"] == pytest.approx(1e3 * facts["latency_s"]["value"], rel=1e-3)
     assert 0.05 <= values["EKF2_OF_N_MIN"] <= values["EKF2_OF_N_MAX"]
 

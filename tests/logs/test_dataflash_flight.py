@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from datetime import UTC, date, datetime
 from pathlib import Path
 
 import numpy as np
@@ -162,7 +163,7 @@ def test_the_gps_in_use_and_the_rangefinder_that_looks_down_are_read(tmp_path, f
     writer = dataflash_of(flight)
     for i in range(100):
         time_us = 40e6 + 2e5 * i
-        writer.put("GPS", time_us, 1, 3, ORIGIN[0] + 0.001, ORIGIN[1], 500.0, 0.0, 0.0, 0.0, 0)
+        writer.put("GPS", time_us, 1, 3, 0, 0, ORIGIN[0] + 0.001, ORIGIN[1], 500.0, 0.0, 0.0, 0.0, 0)
         writer.put("RFND", time_us, 1, 9.0, 4, 0)
     log = read(tmp_path, writer)
     assert np.abs(log.streams[Sensor.GPS_POSITION].value).max() < 15.0
@@ -190,8 +191,8 @@ BAD_ROWS = [
     ("RFND", (0, 3.0, 4, 0), Sensor.RANGE, "not_downward"),
     ("OF", (255, float("nan"), 0.0, 0.0, 0.0), Sensor.FLOW_RATE, "not_finite"),
     ("OF", (255, 1e9, 0.0, 0.0, 0.0), Sensor.FLOW_RATE, "out_of_range"),
-    ("GPS", (0, 1, 47.0, 8.5, 400.0, 0.0, 0.0, 0.0, 1), Sensor.GPS_POSITION, "no_fix"),
-    ("GPS", (0, 3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1), Sensor.GPS_VELOCITY, "out_of_range"),
+    ("GPS", (0, 1, 0, 0, 47.0, 8.5, 400.0, 0.0, 0.0, 0.0, 1), Sensor.GPS_POSITION, "no_fix"),
+    ("GPS", (0, 3, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1), Sensor.GPS_VELOCITY, "out_of_range"),
     ("IMU", (0, 0.0, 0.0, 0.0, 0.0, 0.0, -9.8, 0, 1), Sensor.IMU, "invalid"),
     ("MAG", (0, 200, 0, 400, 0), Sensor.MAG, "invalid"),
     ("BARO", (0, float("inf")), Sensor.BARO, "not_finite"),
@@ -377,3 +378,20 @@ def test_ardupilots_flow_has_the_convention_of_measurement(real):
     found, *_ = np.linalg.lstsq(causes, value[range_m > 1.0], rcond=None)
     expected = [[0, 1, 0, 0], [-1, 0, 0, 0], [1, 0, 1, 0], [0, 1, 0, 1]]  # v_x/r, v_y/r, w_x, w_y by column of value
     assert np.abs(found - expected).max() < 0.15
+
+
+def test_pymavlink_reads_the_sample_without_a_bad_message_and_dates_it(tmp_path, capfd):
+    from pymavlink.DFReader import DFReader_binary
+
+    path = tmp_path / "flight.bin"
+    path.write_bytes(dataflash_of(log_of_flight(5.0)).content())
+    log, dated, times = DFReader_binary(str(path)), [], []
+    while (message := log.recv_msg()) is not None:
+        if message.get_type() == "GPS":
+            dated.append(message._timestamp)
+            times.append(1e-6 * message.TimeUS)
+    log.close()
+    assert len(dated) > 10
+    np.testing.assert_allclose(np.array(dated) - np.array(times), dated[0] - times[0], atol=2e-3)
+    assert datetime.fromtimestamp(dated[0], UTC).date() == date(2026, 1, 4)
+    assert "bad msg" not in "".join(capfd.readouterr())

@@ -68,7 +68,8 @@ def test_the_kind_of_a_file(tmp_path, name, head, kind):
 def test_what_is_no_log_is_said_with_what_would_be(tmp_path):
     (tmp_path / "notes.txt").write_text("hello")
     known = (
-        r"CSV files, a PX4 ULog \(.ulg\), an ArduPilot DataFlash log \(.bin\), a MAVLink telemetry log \(.tlog\), "
+        r"CSV files \(flownav's, or ulog2csv's\), a PX4 ULog \(.ulg\), an ArduPilot DataFlash log \(.bin, or .log as "
+        r"text\), a MAVLink telemetry log \(.tlog\), "
         r"a ROS bag \(a folder, .db3, .mcap, .bag\), a Crazyflie's log, a Betaflight or INAV blackbox, "
         r"or a live session's record \(.fnr\)"
     )

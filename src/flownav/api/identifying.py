@@ -68,6 +68,8 @@ def identify_logs(
     base: str | Path | None,
 ) -> Sensor:  # fmt: skip
     """The sensor that these logs show. InputError as `identify`."""
+    from dataclasses import replace
+
     from flownav.api.sensor import Sensor
     from flownav.core.compile import announce_compilation
     from flownav.core.provenance import command_line
@@ -80,5 +82,7 @@ def identify_logs(
     structures, base_sensor = parse_order(order), load_sensor(base)
     with announce_compilation("identification"):
         findings = findings_of(logs, structures, heights_m, reference, flow_instance)
+    if base is not None:
+        findings = replace(findings, datasheet=base_sensor)
     entries = sensor_entries(findings, base_sensor, f"identified from {name_of(logs)}", command_line())
     return Sensor(entries, None, findings)

@@ -159,7 +159,7 @@ class Sensor:
     def save_parameters(self, path: str | Path, autopilot: str = "px4") -> dict[str, float]:
         """Write the autopilot's parameters that follow from an identification; each by its name.
 
-        autopilot: "px4" or "ardupilot". InputError for another, and for a sensor that was not just identified.
+        autopilot: "px4", "ardupilot" or "inav". InputError for another, and for a sensor that was not just identified.
 
         Example:
             >>> flownav.Sensor.load().save_parameters(folder / "sensor.params")
@@ -171,7 +171,7 @@ flownav.identify found; identify it anew
 
         if self.findings is None:
             raise InputError(f"{self.name}: parameters follow from what flownav.identify found; identify it anew")
-        found = write_parameters(Path(path), autopilot, self.findings, self.file)
+        found = write_parameters(Path(path), autopilot, self.findings, self.name)
         return {parameter.name: float(parameter.text) for parameter in found}
 
     def file_path(self) -> Path:

@@ -49,7 +49,7 @@ def command(
     heights: Annotated[list[str] | None, option("M", HEIGHTS, unset="as the log says")] = None,
     reference: Annotated[str, chosen(REFERENCE, *options.REFERENCES)] = "auto",
     flow_instance: options.FlowInstance = None,
-    autopilot: Annotated[str | None, chosen(FOR, *options.AUTOPILOTS, flag="--for")] = None,
+    autopilot: Annotated[str | None, chosen(FOR, *options.SCALED_FLOW, flag="--for")] = None,
     base: Annotated[Path | None, option("FILE.toml", BASE, unset="the paper's sensor")] = None,
     out: Annotated[Path | None, out_option("The sensor file (TOML)", "out/LOG.toml")] = None,
     force: options.Force = False,
@@ -61,8 +61,8 @@ def command(
     require_logs(logs)
 
     from flownav.api.identifying import identify_logs
-    from flownav.lab.identification.autopilot_parameters import AUTOPILOTS as SUFFIXES
-    from flownav.lab.identification.autopilot_parameters import left_out
+    from flownav.lab.identification.autopilot_parameters import left_out, parameters
+    from flownav.lab.identification.parameter_file import AUTOPILOTS as SUFFIXES
 
     suffix = None if autopilot is None else SUFFIXES[autopilot]
     path = place(_sensor_path(out, logs), *logs, base, force=force, beside=(suffix,) if suffix else ())
@@ -74,6 +74,7 @@ def command(
     if parameter_path is not None and autopilot is not None and findings is not None:
         facts |= {"parameters": str(parameter_path), "autopilot": sensor.save_parameters(parameter_path, autopilot)}
         facts |= {"left_out": dict(left_out(autopilot, findings))}
+        facts |= {"cut": {p.name: p.needed for p in parameters(autopilot, findings) if p.needed is not None}}
     if findings is not None:
         answer(facts, as_json, lambda: show(findings, facts))
 
@@ -97,12 +98,18 @@ def show(findings: Findings, facts: dict[str, Any]) -> None:
     law, noise = findings.scale_with_speed, findings.noise.law
     if law is not None:
         say(f"Speed: {law.verdict}; {_interval(law.per_m_s, 1.0, 3)} per m/s")
+    if findings.offset is not None:
+        x, y = (_interval(axis, 1.0, 4) for axis in findings.offset)
+        say(f"Offset: flow about x {x}, about y {y} rad/s{'' if findings.offset.matters else '; none that is certain'}")
+    if findings.gyro_verdict:
+        say(f"Fault: {findings.gyro_verdict}")
     say(
         f"Error: {_interval(noise.sigma_m_s, 1.0, 3)} m/s at {noise.reference_m:.2f} m, growing with height to the "
         f"power {_interval(noise.exponent, 1.0, 2)} from {noise.low_m:.2f} to {noise.high_m:.2f} m",
         table_of(SCHEDULES, findings.noise.schedules, title="Schedules of the variance (best first)"),
         *(f"Note: {note}" for note in findings.notes),
         *(f"Not written: {name}; {why}" for name, why in facts.get("left_out", {}).items()),
+        *(f"Cut to its range: {name}; {needed:.4g} is needed" for name, needed in facts.get("cut", {}).items()),
     )
     say_files(facts, ("sensor", "parameters"))
 

@@ -31,6 +31,7 @@ TRUTH_MODELS = ("ensemble", "matched", "both")
 ORDERS = ("auto", "delay", *(f"{n}{with_delay}" for with_delay in ("", "+delay") for n in range(1, 7)))
 REFERENCES = ("auto", "velocity", "encoder", "truth", "gps")
 AUTOPILOTS = ("px4", "ardupilot")
+SCALED_FLOW = (*AUTOPILOTS, "inav")  # whose parameters `identify` writes
 SENDINGS = ("odometry", "vision", "landing-target", "none")
 LINKS = ("udp:", "udpout:", "tcp:", "tcpin:", "serial:")
 EXCITATIONS = ("swing", "lengths", "chirp", "steps")

@@ -57,7 +57,7 @@ def read_csv_table(path: Path, columns: Sequence[Column], *, seldom: bool = Fals
     """
     content = content_of(path, "a folder of CSV files")
     malformed: list[int] = []
-    raw = _parse(path, content, [column.name for column in columns], malformed)
+    raw = columns_of(path, content, ["t_s", *(column.name for column in columns)], malformed)
     lacking = [c.name for c in columns if c.required and c.name not in raw] + ([] if "t_s" in raw else ["t_s"])
     if lacking:
         needs = ", ".join(["t_s", *(c.name for c in columns if c.required)])
@@ -76,8 +76,11 @@ def read_csv_table(path: Path, columns: Sequence[Column], *, seldom: bool = Fals
     return table
 
 
-def _parse(path: Path, content: bytes, wanted: list[str], malformed: list[int]) -> dict[str, Array]:
-    """The wanted columns as floats; text that is no number is NaN, rows of another length are left out."""
+def columns_of(path: Path, content: bytes, wanted: Sequence[str], malformed: list[int]) -> dict[str, Array]:
+    """The wanted columns as floats (n,); text that is no number is NaN, rows of another length are left out.
+
+    malformed: becomes one entry longer for each row that is left out. InputError where it is no CSV table.
+    """
     import pyarrow as pa
     from pyarrow import csv
 
@@ -99,9 +102,9 @@ def _parse(path: Path, content: bytes, wanted: list[str], malformed: list[int]) 
             ),
         )
 
-    header = _header(path, content)
+    header = header_of(path, content)
     readable = content if content.isascii() else content.decode("utf-8", errors="replace").encode()
-    names = [name for name in dict.fromkeys(["t_s", *wanted]) if name in header]
+    names = [name for name in dict.fromkeys(wanted) if name in header]
     if not names:
         return {}
     try:
@@ -117,8 +120,8 @@ def _parse(path: Path, content: bytes, wanted: list[str], malformed: list[int]) 
         raise InputError(f"{path}: not a CSV table ({str(error).splitlines()[0]})") from None
 
 
-def _header(path: Path, content: bytes) -> list[str]:
-    """Column names of the first line."""
+def header_of(path: Path, content: bytes) -> list[str]:
+    """Column names of the first line. InputError where it is none, too long, or names one twice."""
     end = content.find(b"\n", 0, MOST_HEADER_BYTES)
     if end < 0 and len(content) > MOST_HEADER_BYTES:
         raise InputError(f"{path}: its first line has more than {MOST_HEADER_BYTES} bytes; a CSV table is needed")

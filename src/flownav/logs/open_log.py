@@ -14,11 +14,12 @@ from flownav.logs.journal import MAGIC as JOURNAL_MAGIC
 from flownav.logs.journal import SUFFIX as JOURNAL_SUFFIX
 from flownav.logs.log import Log
 from flownav.logs.references import examined, upside_down
+from flownav.logs.topic_files import is_topic_folder
 
 KNOWN = (
-    "a folder of CSV files, a PX4 ULog (.ulg), an ArduPilot DataFlash log (.bin), a MAVLink telemetry log (.tlog), a "
-    "ROS bag (a folder, .db3, .mcap, .bag), a Crazyflie's log, a Betaflight or INAV blackbox, or a live session's "
-    "record (.fnr)"
+    "a folder of CSV files (flownav's, or ulog2csv's), a PX4 ULog (.ulg), an ArduPilot DataFlash log (.bin, or .log as "
+    "text), a MAVLink telemetry log (.tlog), a ROS bag (a folder, .db3, .mcap, .bag), a Crazyflie's log, a Betaflight "
+    "or INAV blackbox, or a live session's record (.fnr)"
 )
 READERS = {
     "ulog": ("ulog", "read_ulog"),
@@ -67,6 +68,10 @@ def _read(path: Path, flow_instance: int | None, topics: Mapping[str, str] | Non
         return read_ros(path, flow_instance=flow_instance, topics=topics)
     if topics:
         raise InputError(f"{arg('topics')}: {path} is no ROS bag; leave it out")
+    if folder and is_topic_folder(path):
+        from flownav.logs.ulog_csv import read_topic_folder
+
+        return read_topic_folder(path, flow_instance=flow_instance)
     if folder:
         if flow_instance is not None:
             raise InputError(

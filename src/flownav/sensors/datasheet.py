@@ -21,6 +21,7 @@ from flownav.sensors.noise_law import Noise, not_below
 DEFAULT_SENSOR = "px4flow_paper.toml"
 UNTURNED = ((1.0, 0.0), (0.0, 1.0))
 BAND_HZ = 1.0  # of the closed loop: attitude follows to 5.4 rad/s (`simulation.assemble`), velocity less far
+OFFSET_CERTAIN = 1.5  # half-widths of its 95 % interval: an uncertain offset would do more harm than good
 DELAY_WITHIN_DEG = 10.0  # a delay stands for dynamics whose phase it follows so well
 
 
@@ -162,6 +163,12 @@ class Identification(ParameterModel):
     latency_s: Number  # delay of slow motion, over all axes and heights
     latency_low_s: Number  # lower end of its 95 % interval
     latency_high_s: Number  # upper end of its 95 % interval
+    offset_x_rad_s: Number | None = None  # of the flow about body x, the axes put right, where nothing moves
+    offset_x_low_rad_s: Number | None = None  # lower end of its 95 % interval
+    offset_x_high_rad_s: Number | None = None  # upper end of its 95 % interval
+    offset_y_rad_s: Number | None = None  # of the flow about body y
+    offset_y_low_rad_s: Number | None = None  # lower end of its 95 % interval
+    offset_y_high_rad_s: Number | None = None  # upper end of its 95 % interval
     lowest_height_m: Number = Field(ge=0.0)  # of the readings used
     highest_height_m: Number = Field(gt=0.0)  # of the readings used
     fastest_flow_rad_s: Number = Field(ge=0.0)  # of the usable readings (99.9 %)
@@ -207,16 +214,20 @@ def load_sensor(path: Path | str | None = None) -> FlowSensor:
 
 # -- what the file says to those who use the sensor ---------------------------------------------------------------
 class IdentifiedFlow(NamedTuple):
-    """Reported over true velocity of each body axis, the age of a reading, and sensor's axes = axes @ vehicle's."""
+    """Reported over true velocity of each body axis, the age of a reading, and sensor's axes = axes @ vehicle's.
+
+    offset_rad_s: what the flow about x and y, its axes put right, reads where nothing moves.
+    """
 
     gain_u: float
     gain_v: float
     latency_s: float
     axes: tuple[tuple[float, float], tuple[float, float]] = UNTURNED
+    offset_rad_s: tuple[float, float] = (0.0, 0.0)
 
 
 def in_vehicle_axes(value: Array, identified: IdentifiedFlow, *, angular: bool) -> Array:
-    """Readings (n, 2 or more) of a sensor that is turned or wired otherwise, in the vehicle's axes.
+    """Readings (n, 2 or more) of a sensor that is turned or wired otherwise, in the vehicle's axes, without its offset.
 
     A sensor's axes are the vehicle's, each with a sign and perhaps swapped, so the way back is the transpose. Angular
     flow and the sensor's own gyro (columns 2 and 3) turn as the velocity (flow_y, -flow_x) does.
@@ -228,6 +239,8 @@ def in_vehicle_axes(value: Array, identified: IdentifiedFlow, *, angular: bool) 
             value[:, y], value[:, x] = forward, -right
         else:
             value[:, x], value[:, y] = back @ value[:, [x, y]].T
+    if angular and any(identified.offset_rad_s):
+        value[:, :2] -= identified.offset_rad_s
     return value
 
 
@@ -279,4 +292,16 @@ def identified_flow(sensor: FlowSensor, lag_states: bool | None = None) -> Ident
         sure = any(not r.gain_low <= 1.0 <= r.gain_high for r in rows)
         return float(np.mean([r.gain for r in rows])) if sure else 1.0
 
-    return IdentifiedFlow(gain_of("x"), gain_of("y"), max(found.latency_s - carried_s, 0.0), axes)
+    offset = _certain(found, "x"), _certain(found, "y")
+    return IdentifiedFlow(gain_of("x"), gain_of("y"), max(found.latency_s - carried_s, 0.0), axes, offset)
+
+
+def _certain(found: Identification, axis: str) -> float:
+    """The flow's offset about an axis [rad/s] that is taken out; 0 where the file has none."""
+    value, low, high = (getattr(found, f"offset_{axis}{end}_rad_s") for end in ("", "_low", "_high"))
+    return 0.0 if value is None or low is None or high is None else certain_offset(value, low, high)
+
+
+def certain_offset(value: float, low: float, high: float) -> float:
+    """An offset [rad/s] that is known well enough to be taken out, beyond three standard deviations; else 0."""
+    return float(value) if abs(value) > OFFSET_CERTAIN * 0.5 * (high - low) else 0.0

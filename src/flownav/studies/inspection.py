@@ -11,6 +11,8 @@ from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import VELOCITY_BODY
 from flownav.lab.identification.first_look import IN_PART, Look, first_look
 from flownav.lab.identification.flight import jumps
+from flownav.lab.identification.own_gyro import own_gyro
+from flownav.lab.identification.range_truth import untrue
 from flownav.logs.log import Log, attitude_at
 from flownav.logs.plausible import check_plausible
 from flownav.replays.judged import autopilot_scores, flying_at, obstacles
@@ -45,10 +47,10 @@ def summarise(log: Log) -> dict[str, Any]:
         "streams": [_stream(stream) for stream in log.streams.values()],
         "clock": [line for stream in log.streams.values() for line in _clock_trouble(stream)],
         "limits": {name: _limit(log, name) for name in log.limits},
-        "verdict": why_not if look is None else look.verdict,
+        "verdict": _verdict(log, look, why_not),
         "explained": explained.verdict,
         "causes": [one.name for one in explained.findings],
-        "agreement": None if look is None else look._asdict(),
+        "agreement": None if look is None else {**look._asdict(), "agrees": look.agrees},
         "checked": checked,
         "warnings": [finding.text for finding in found],
         "flow_is_wrong": any(finding.flow_is_wrong for finding in found),
@@ -69,6 +71,14 @@ def _look(log: Log) -> tuple[Look | None, str]:
         return first_look(log), ""
     except InputError as error:
         return None, f"flow is not compared with a reference: {str(error).removeprefix(f'{log.path}: ')}"
+
+
+def _verdict(log: Log, look: Look | None, why_not: str) -> str:
+    """Flow against its reference in words, and what the sensor's own gyro shows to be wrong, which needs none."""
+    known = look is not None and look.correlation >= IN_PART
+    gyro = own_gyro(log)
+    wrong = "" if gyro is None else gyro.sentence(abs(look.scale) if look is not None and known else None)
+    return "; ".join(filter(None, [why_not if look is None else look.verdict, wrong]))
 
 
 def _stream(stream: Stream) -> dict[str, Any]:
@@ -188,8 +198,9 @@ def _of_range(log: Log) -> list[Finding]:
     aloft = flying_at(log, stream.t_s - stream.delay_s) & (stream.value[:, 0] > 0.0)
     t_s, range_m = stream.t_s[aloft], stream.value[aloft, 0]
     share, doubt = jumps(t_s, range_m)
+    told = [Finding(line) for line in untrue(log, aloft).said]
     if share < LEAST_JUMPING:
-        return []
+        return told
     largest = float(np.abs(np.diff(range_m)).max())
     jumping = f"range jumps in {share:.0%} of its steps in flight, by up to {largest:.1f} m"
-    return [Finding(f"{jumping}: velocities from flow and range are off by {doubt:.0%} or so")]
+    return [*told, Finding(f"{jumping}: velocities from flow and range are off by {doubt:.0%} or so")]

@@ -31,6 +31,8 @@ GOOD, DOWNWARD, FIX_3D = 4, 25, 3
 LANDED, FLYING, FIRST_SET = 18, 28, 84  # LogEvent; the source sets 1 to 3 follow the last
 MILLIGAUSS_PER_GAUSS = 1e3
 SIMULATED_EVERY = 2  # rows of the truth
+# invented: GPS time when the vehicle was switched on (4 January 2026); readers date every message of a log by it
+GPS_WEEK, BOOT_MS, WEEK_MS = 2400, 36_000_000, 604_800_000
 
 
 class DataFlashWriter:
@@ -81,7 +83,8 @@ def define_flight(writer: DataFlashWriter) -> None:
     """The messages that a flight's log has, as ArduCopter 4.6 writes them."""
     writer.define("ATT", "Qccc", "TimeUS,Roll,Pitch,Yaw", "s---", "F---")
     writer.define("IMU", "QBffffffBB", "TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,GH,AH", "s#EEE-----", "F-000-----")
-    writer.define("GPS", "QBBLLefffB", "TimeUS,I,Status,Lat,Lng,Alt,Spd,GCrs,VZ,U", "s#--------", "F---------")
+    labels = "TimeUS,I,Status,GMS,GWk,Lat,Lng,Alt,Spd,GCrs,VZ,U"
+    writer.define("GPS", "QBBIHLLefffB", labels, "s#----------", "F-----------")
     writer.define("GPA", "QBCCCB", "TimeUS,I,HAcc,VAcc,SAcc,VV", "s#----", "F-----")
     writer.define("OF", "QBffff", "TimeUS,Qual,flowX,flowY,bodyX,bodyY", "s-EEEE", "F-0000")
     writer.define("RFND", "QBCBB", "TimeUS,Instance,Dist,Stat,Orient", "s#m--", "FB---")
@@ -99,6 +102,12 @@ def define_simulated(writer: DataFlashWriter) -> None:
     """The truth of a simulated flight, as ArduPilot's simulator writes it."""
     writer.define("SIM", "QccCfLLffff", "TimeUS,Roll,Pitch,Yaw,Alt,Lat,Lng,Q1,Q2,Q3,Q4", "s----------", "F----------")
     writer.define("SIM2", "Qdddfff", "TimeUS,PN,PE,PD,VN,VE,VD", "s------", "F------")
+
+
+def gps_time(time_us: float) -> tuple[int, int]:
+    """A receiver's time of week [ms] and week, at a time since boot [us]."""
+    since_ms = BOOT_MS + round(1e-3 * time_us)
+    return since_ms % WEEK_MS, GPS_WEEK + since_ms // WEEK_MS
 
 
 def _packed(code: str, value: object) -> bytes:
@@ -194,7 +203,7 @@ def _fixes(log: Log) -> Iterator[Row]:
     columns = (fixes.t_s, fixes.lat_deg, fixes.lon_deg, fixes.alt_m, np.hypot(north, east), course, down)
     sigmas = np.column_stack([fixes.sigma_m, fixes.sigma_m_s]).tolist()
     for (t_s, *values), stated in zip(np.column_stack(columns).tolist(), sigmas, strict=True):
-        yield Row(t_s, "GPS", (0, FIX_3D, *values, 1))
+        yield Row(t_s, "GPS", (0, FIX_3D, *gps_time(1e6 * (BOOT_S + t_s)), *values, 1))
         yield Row(t_s, "GPA", (0, *stated, 1))
 
 

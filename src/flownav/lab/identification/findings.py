@@ -1,6 +1,6 @@
 """What an identification found, whatever kind of log it came from: the one bundle that file, JSON and table read."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -9,9 +9,12 @@ from flownav.core.measurement import Array
 from flownav.core.text import finite
 from flownav.lab.identification import height_law
 from flownav.lab.identification.first_look import Axes
+from flownav.lab.identification.offset import Offset
 from flownav.lab.identification.output_error import Fit
+from flownav.lab.identification.own_gyro import OwnGyro
 from flownav.lab.identification.quantities import Choice, Excitation, Interval
 from flownav.lab.identification.scale import SpeedLaw
+from flownav.sensors.datasheet import FlowSensor
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,9 @@ class Findings:
 
     kind: "rig" or "flight"; reference: what the sensor was compared with; max_flow_rad_s: the fastest flow seen
     while usable (99.9 %); heights_m: least and greatest; notes: one line each; details: further figures for JSON;
-    scale_with_speed: None where no law shows.
+    scale_with_speed: None where no law shows. offset: of the flow [rad/s], None where the log does not show it.
+    own_gyro: the sensor's against the IMU's, None where either lacks. parameters: what the vehicle was set to, as far
+    as the log says. datasheet: the file that was given for what no log tells; None where none was.
     """
 
     kind: str
@@ -93,6 +98,22 @@ class Findings:
     notes: tuple[str, ...] = ()
     details: dict[str, object] = field(default_factory=dict)
     scale_with_speed: SpeedLaw | None = None
+    offset: Offset | None = None
+    own_gyro: OwnGyro | None = None
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    datasheet: FlowSensor | None = None
+
+    @property
+    def gyro_verdict(self) -> str:
+        """What the sensor's own gyro shows to be wrong, in words; "" where nothing is."""
+        return "" if self.own_gyro is None else self.own_gyro.sentence(abs(self.gain.value))
+
+    @property
+    def no_scaler_mends(self) -> str:
+        """Why no factor on the flow would mend it, in words; "" where one may."""
+        gyro = self.own_gyro
+        of_time = gyro is not None and gyro.is_off and gyro.is_of_time(abs(self.gain.value))
+        return self.gyro_verdict if of_time else ""
 
     @property
     def gain(self) -> Interval:
@@ -139,11 +160,29 @@ def facts_of(findings: Findings) -> dict[str, Any]:
             "schedules": [s._asdict() for s in findings.noise.schedules],
         },
         "scale_with_speed": _speed(findings),
+        "flow_offset_rad_s": _offset(findings.offset),
+        "own_gyro": _own_gyro(findings),
         "responses": [_response(response) for response in findings.responses],
         "notes": list(findings.notes),
         "details": findings.details,
     })  # fmt: skip
     return facts
+
+
+def _offset(offset: Offset | None) -> dict[str, Any] | None:
+    return None if offset is None else {axis: getattr(offset, axis)._asdict() for axis in offset._fields}
+
+
+def _own_gyro(findings: Findings) -> dict[str, Any] | None:
+    gyro = findings.own_gyro
+    if gyro is None:
+        return None
+    return {
+        "slope": gyro.slope._asdict(),
+        "lag_s": gyro.lag_s,
+        "likeness": gyro.likeness,
+        "verdict": findings.gyro_verdict,
+    }
 
 
 def _speed(findings: Findings) -> dict[str, Any] | None:

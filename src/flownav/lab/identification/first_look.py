@@ -3,13 +3,16 @@
 The quick part of an identification, for `flownav info`.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from flownav.core.measurement import Array, Sensor
 from flownav.lab.identification import reference_motion
-from flownav.lab.identification.flight import IMU_NAME, Flight, flight
+from flownav.lab.identification.flight import IMU_NAME, LEAST_FLOW, Flight, flight
+from flownav.lab.identification.own_gyro import ALIKE_WITHIN
+from flownav.lab.identification.reference_truth import in_one_piece, without_leaps_and_stands
 from flownav.logs.log import Log, mean_over
 
 CLEAR_RATIO = 2.0  # the best assignment must explain this much more than the next
@@ -103,7 +106,12 @@ def judged(log: Log, reference: str = "auto") -> Judged:
 
 
 def _judged(flown: Flight) -> Judged:
+    flown, leaps = without_leaps_and_stands(flown)
     moved = reference_motion.motion(flown)
+    piece, turns = in_one_piece(flown, moved)
+    if turns and np.count_nonzero(piece.good) >= LEAST_FLOW:
+        flown, moved = piece, reference_motion.motion(piece)
+    flown = replace(flown, notes=(*flown.notes, *(f"the reference: {line}" for line in (*leaps, *turns))))
     tie = moved.flow_tie
     age_s = tie.delay_s.value if tie is not None and tie.holds else flown.age_s
     response = reference_motion.velocity_response(flown, moved, age_s)
@@ -111,7 +119,11 @@ def _judged(flown: Flight) -> Judged:
 
 
 # -- a first look ------------------------------------------------------------------------------------------------
-OFF, APART_S, LATEST_S = 0.05, 0.03, 0.3  # of scale and time that velocities agree within; GPS may be so late
+OFF, APART_S, LATEST_S = (
+    0.05,
+    0.03,
+    0.3,
+)  # of scale and time, to be named; GPS may be so late
 AGREE, IN_PART = 0.9, 0.4  # correlation from which two velocities agree, or do so in part
 
 
@@ -141,6 +153,12 @@ class Look(NamedTuple):
         return " and ".join(found)
 
     @property
+    def agrees(self) -> bool:
+        """Whether they describe one motion: alike, and of one size."""
+        low, high = ALIKE_WITHIN
+        return self.correlation >= AGREE and low <= self.scale <= high
+
+    @property
     def verdict(self) -> str:
         """In words."""
         alone = "the quick changes of flow and IMU are"
@@ -152,6 +170,9 @@ class Look(NamedTuple):
         agree = "agree" if self.correlation >= AGREE else f"agree in part (correlation {self.correlation:.2f})"
         if differ := self.differences():
             agree, figures = f"{agree} in shape, not in size and time", f"{differ} ({figures})"
+            if not ALIKE_WITHIN[0] <= self.scale <= ALIKE_WITHIN[1]:
+                alike = f"alike in shape (correlation {self.correlation:.2f})"
+                agree, figures = "do not agree in size", f"{alike}, {figures}"
         if self.right or not self.clear:
             return f"flow and {self.against} {agree}: {figures}"
         return f"flow and {self.against} disagree: {self.axes}; put right they {agree}: {figures}"

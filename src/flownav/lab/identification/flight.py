@@ -21,6 +21,7 @@ from flownav.core.errors import InputError, arg
 from flownav.core.frames import GRAVITY_M_S2 as GRAVITY_M_S2
 from flownav.core.frames import rotation_from_quaternion, velocity_from_flow
 from flownav.core.measurement import Array, Sensor, Stream
+from flownav.lab.identification.range_truth import untrue
 from flownav.logs.log import Log, attitude_at
 from flownav.replays.bundle import turned_sensor, with_attitude
 from flownav.replays.judged import flying_at
@@ -170,7 +171,7 @@ def flight(log: Log, reference: str = "auto", axes: Array | None = None) -> Flig
             f"{log.path}: the reference ({name}) covers {reference_t_s[0]:.1f} to {reference_t_s[-1]:.1f} s, where "
             f"{np.count_nonzero(shared)} flow readings lie; at least {LEAST_FLOW} are needed, on one clock"
         )
-    ranges = _ranges(log)
+    ranges, untrue_said = _ranges(log)
     range_m, near = beside(ranges, t_s - age_s)
     velocity, rate = _velocity_and_rate(sensor, value, range_m)
     velocity = velocity @ axes.T if axes is not None and turned else velocity  # back in the sensor's own axes
@@ -180,27 +181,38 @@ def flight(log: Log, reference: str = "auto", axes: Array | None = None) -> Flig
         raise InputError(
             f"{log.path}: {np.count_nonzero(good)} of {len(good)} flow readings are usable (in flight, quality above "
             f"0, a range near that can be believed, not exactly zero); at least {LEAST_FLOW} are needed"
+            + "".join(f"; {line}" for line in untrue_said)
         )
     if not np.all(np.ptp(velocity[good], axis=0) > 0.0):
         raise InputError(f"{log.path}: the flow is constant; a flight that moves is needed")
     return Flight(
         str(log.path), t_s, velocity, age_s, quality, range_m, good, log.streams[Sensor.ATTITUDE],
         log.streams.get(Sensor.IMU), chosen, reference_t_s, reference_m, _velocity(log) if chosen == "gps" else None,
-        float(np.quantile(np.abs(rate[good]), 0.999)), tuple(note for note in (*prepared.notes, found) if note), name,
+        float(np.quantile(np.abs(rate[good]), 0.999)),
+        tuple(note for note in (*prepared.notes, found, *untrue_said) if note), name,
         ranges.jumping, ranges.doubt, bool(found),
     )  # fmt: skip
 
 
-def _ranges(log: Log) -> Ranges:
-    """The ranges of the flight to go by. InputError where they jump most of the time, or are hardly any."""
+def _ranges(log: Log) -> tuple[Ranges, tuple[str, ...]]:
+    """The ranges of the flight to go by, and what is wrong with the others.
+
+    InputError where they jump most of the time, or are hardly any.
+    """
     distance = log.streams[Sensor.RANGE]
-    ranges = believed(str(log.path), distance, flying_at(log, distance.t_s - distance.delay_s))
-    if ranges.jumping > MOST_JUMPING:
+    flying = flying_at(log, distance.t_s - distance.delay_s)
+    wrong = untrue(log, flying)
+    aloft = flying & (distance.value[:, 0] > 0.0)
+    jumping, _ = jumps(distance.t_s[aloft] - distance.delay_s, distance.value[aloft, 0])
+    if jumping > MOST_JUMPING:
         raise InputError(
-            f"{log.path}: the range jumps in {ranges.jumping:.0%} of its steps in flight; a range that can be believed "
+            f"{log.path}: the range jumps in {jumping:.0%} of its steps in flight; a range that can be believed "
             "is needed for the flow's scale and height"
         )
-    return ranges
+    try:
+        return believed(str(log.path), distance, flying & ~wrong.flags), wrong.said
+    except InputError as error:
+        raise InputError("; ".join([str(error), *wrong.said])) from None
 
 
 def _velocity_and_rate(sensor: Sensor, value: Array, range_m: Array) -> tuple[Array, Array]:

@@ -21,7 +21,9 @@ from flownav.lab.identification.experiment import Experiment, experiment
 from flownav.lab.identification.findings import Findings, Noise, Response, noise_of
 from flownav.lab.identification.first_look import Axes, judged
 from flownav.lab.identification.flight import Flight
+from flownav.lab.identification.offset import flow_offset, without
 from flownav.lab.identification.output_error import Z_95, fit
+from flownav.lab.identification.own_gyro import own_gyro
 from flownav.lab.identification.quantities import Interval, choose, cross_validation, latency
 from flownav.lab.identification.reference_motion import (
     Motion,
@@ -66,6 +68,10 @@ def identify_flight(
         moved = with_flow(moved, flown, put_right)
         age_s = _age(flown, moved)
     scale, track = _scale(flown, moved, age_s, put_right)
+    offset = flow_offset(flown, moved, put_right, scale.response, age_s)
+    if offset is not None and offset.matters:
+        put_right = without(put_right, flown.range_m, offset)
+        scale, track = _scale(flown, moved, age_s, put_right)
     runs = [_axis_run(flown, moved, put_right, axis) for axis in (0, 1)]
     structures = candidates if len(candidates) == 1 else FLIGHT_ORDERS
     responses = []
@@ -92,6 +98,9 @@ def identify_flight(
         (*flown.notes, *_notes(flown, moved, scale, axes), *told),
         _details(flown, moved, scale, axes, raw, track),
         law,
+        offset,
+        own_gyro(log),
+        log.parameters,
     )
 
 

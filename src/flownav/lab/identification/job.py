@@ -17,6 +17,7 @@ from flownav.lab.identification.output_error import fit
 from flownav.lab.identification.quantities import CANDIDATES, choose, cross_validation, gain, latency
 from flownav.lab.identification.rig_log import Run, assign_heights, is_rig, read_runs
 from flownav.logs.open_log import log_kind
+from flownav.logs.topic_files import is_topic_folder
 
 SAME_HEIGHT = 0.02  # runs within 2 % of a height belong together
 UNKNOWN_HEIGHT = f"its height is unknown: give {arg('heights_m')}, height_m in rig.toml, or a ground_distance_m column"
@@ -135,7 +136,8 @@ def identify(
 
 def is_flight(path: Path) -> bool:
     """Whether a path holds a flight: a log file, or a folder of CSV files with an attitude or an IMU."""
-    return any((path / name).exists() for name in ("attitude.csv", "imu.csv")) or bool(log_kind(path))
+    own = any((path / name).exists() for name in ("attitude.csv", "imu.csv"))
+    return own or bool(log_kind(path)) or (path.is_dir() and is_topic_folder(path))
 
 
 def name_of(logs: Sequence[Path]) -> str:

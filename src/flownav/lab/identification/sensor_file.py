@@ -147,6 +147,7 @@ def _identification(findings: Findings) -> dict[str, Any]:
         "identifiable": excitation.identifiable,
         **_interval("gain", findings.gain, ""),
         **_interval("latency", findings.latency_s, "_s"),
+        **_offset(findings),
         "lowest_height_m": findings.heights_m[0],
         "highest_height_m": findings.heights_m[1],
         "fastest_flow_rad_s": findings.max_flow_rad_s,
@@ -163,6 +164,13 @@ def _identification(findings: Findings) -> dict[str, Any]:
         ],
         "sources": [{"path": str(file), "sha256": hash_of(file)} for file in findings.files],
     }
+
+
+def _offset(findings: Findings) -> dict[str, float]:
+    found = findings.offset
+    if found is None:
+        return {}
+    return _interval("offset_x", found.x, "_rad_s") | _interval("offset_y", found.y, "_rad_s")
 
 
 def _interval(name: str, interval: Interval, unit: str) -> dict[str, float]:

@@ -8,10 +8,13 @@ import re
 import struct
 from collections.abc import Iterator
 
+import numpy as np
+
 from flownav.logs.dataflash import formats
 
 LOOKED_AT_BYTES = 4096  # the firmware's name and a few numbers stand before the first line
-_FIRST = re.compile(rb"^FMT, ?128, ?89, ?FMT,", re.MULTILINE)
+# FMT's own line is often the first, but tools that cut a log write only the lines of what they keep
+_FIRST = re.compile(rb"^FMT, ?\d{1,3}, ?\d{1,3}, ?[A-Z][A-Z0-9]{1,3}, ?[A-Za-z]{1,16}, ?[A-Za-z]\w*,", re.MULTILINE)
 _SIZES = {"n": 4, "N": 16, "Z": 64}
 _STRUCT = {code: kind for code, kind in formats.CODES.items() if code not in formats.NOT_NUMBERS}
 _LETTERS = {"i1": "b", "u1": "B", "<i2": "h", "<u2": "H", "<i4": "i", "<u4": "I", "<i8": "q", "<u8": "Q", "<f2": "e",
@@ -40,9 +43,15 @@ def _messages(content: bytes) -> Iterator[bytes]:
         try:
             if name == formats.FMT.name:
                 kinds.setdefault(values[2], (int(values[0]), values[3]))
+                values[1] = str(formats.HEADER_BYTES + _size(values[3]))  # a text's own may be anything
             yield bytes((*formats.HEAD, kind)) + b"".join(_packed(*each) for each in zip(codes, values, strict=True))
         except (ValueError, OverflowError, struct.error, KeyError, IndexError):
             continue
+
+
+def _size(codes: str) -> int:
+    """Bytes of a body. KeyError where a character is none of the format's."""
+    return sum(np.dtype(formats.CODES[code]).itemsize for code in codes)
 
 
 def _packed(code: str, value: str) -> bytes:
@@ -54,4 +63,17 @@ def _packed(code: str, value: str) -> bytes:
     kind = "<" + _LETTERS[_STRUCT[code]]
     if code in "fdg":
         return struct.pack(kind, float(value))
-    return struct.pack(kind, round(float(value) * formats.DIVISORS[code]) if code in formats.DIVISORS else int(value))
+    return struct.pack(
+        kind, round(float(value) * formats.DIVISORS[code]) if code in formats.DIVISORS else _whole(value)
+    )
+
+
+def _whole(value: str) -> int:
+    """A whole number, also as a spreadsheet writes it (12.0, 1e+06)."""
+    try:
+        return int(value)
+    except ValueError:
+        number = float(value)
+        if number != round(number):
+            raise
+        return round(number)

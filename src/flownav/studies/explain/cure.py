@@ -7,7 +7,7 @@ made up: the words say what to do.
 from collections.abc import Callable
 from typing import NamedTuple
 
-from flownav.lab.identification.autopilot_parameters import FLOAT, INTEGER, Parameter, file_text
+from flownav.lab.identification.parameter_file import FLOAT, INTEGER, Parameter, file_text
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.sign import Sign
 from flownav.studies.explain.told import ARDUPILOT, PX4

@@ -1,0 +1,114 @@
+"""A reference that is not the path: it leaps, stands still, drifts or is turned from some second on, held against flow.
+
+A leap is taken out of its positions, what stands is left out, and where it drifts or turns the flight is cut in two:
+the piece that agrees better with the flow, or the longer one, is identified. Each is named with its second.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.core.measurement import Array
+from flownav.lab.identification.flight import LEAST_FLOW, Flight
+from flownav.lab.identification.reference_motion import Motion, on_grid
+from flownav.logs.log import mean_over
+
+LEAP_M, FASTEST_M_S, TIMES_THE_USUAL = 1.0, 20.0, 6.0
+STANDS_S, MOVING_M_S, BESIDE_S = 1.5, 0.3, 1.0
+BLOCK_S, LEAST_PIECE_S, LEAST_BLOCKS = 1.0, 12.0, 24
+DRIFT_M_S, TURN_RAD = 0.25, 0.2  # from which on a piece differs from the other
+BETTER = 0.6  # of the residual's power, that two pieces leave of one's
+
+
+class Mended(NamedTuple):
+    """The flight with what can be used of its reference, and what is wrong with the rest, one line each."""
+
+    flown: Flight
+    said: tuple[str, ...]
+
+
+def without_leaps_and_stands(flown: Flight) -> Mended:
+    """The reference's positions without leaps, and the flight without the seconds in which it stands still."""
+    t_s, place = flown.reference_t_s, flown.reference_m
+    if flown.reference == "imu" or len(t_s) < LEAST_BLOCKS:
+        return Mended(flown, ())
+    good, said, ends = flown.good.copy(), [], []
+    for begin, end in _stands(t_s, place):
+        inside = (flown.t_s > begin) & (flown.t_s < end) & flown.good
+        if inside.sum() > 1 and float(np.median(np.hypot(*flown.velocity_m_s[inside].T))) > MOVING_M_S:
+            good &= ~((flown.t_s > begin - BESIDE_S) & (flown.t_s < end + BESIDE_S))
+            said.append(f"{flown.reference_name} stands still from {begin:.1f} to {end:.1f} s while the flow moves")
+            ends.append(end)
+    step = np.diff(place, axis=0)
+    long = np.linalg.norm(step, axis=1)  # of a noisy reference every step is
+    far = long > LEAP_M + FASTEST_M_S * np.minimum(np.diff(t_s), 1.0) + TIMES_THE_USUAL * float(np.median(long))
+    for row in np.flatnonzero(far):
+        place = np.concatenate([place[: row + 1], place[row + 1 :] - step[row]])
+        if not any(abs(t_s[row + 1] - end) < BESIDE_S for end in ends):
+            size = float(np.linalg.norm(step[row]))
+            said.append(f"{flown.reference_name} leaps by {size:.1f} m at {t_s[row + 1]:.1f} s")
+            good &= np.abs(flown.t_s - t_s[row]) > 0.5 * BESIDE_S
+    if not said or np.count_nonzero(good) < LEAST_FLOW:
+        return Mended(flown, ())
+    return Mended(replace(flown, good=good, reference_m=place), tuple(said))
+
+
+def _stands(t_s: Array, place: Array) -> list[tuple[float, float]]:
+    """From when to when the reference repeats one place."""
+    same = np.concatenate([[False], (np.diff(place, axis=0) == 0.0).all(axis=1), [False]])
+    edges = np.flatnonzero(np.diff(same.astype(int))).reshape(-1, 2)
+    spans = [(float(t_s[a]), float(t_s[min(b, len(t_s) - 1)])) for a, b in edges]
+    return [(a, b) for a, b in spans if b - a >= STANDS_S]
+
+
+# -- in two pieces -------------------------------------------------------------------------------------------------
+def in_one_piece(flown: Flight, moved: Motion) -> Mended:
+    """The piece of the flight before or after the reference begins to drift or is turned; all of it where it is not."""
+    if flown.reference != "truth":  # a receiver's velocity is its own, and errs by as much for seconds
+        return Mended(flown, ())
+    t_s, flow, reference = _blocks(flown, moved)
+    if len(t_s) < LEAST_BLOCKS:
+        return Mended(flown, ())
+    whole = _fitted(flow, reference)
+    cuts = [k for k in range(len(t_s)) if min(t_s[k] - t_s[0], t_s[-1] - t_s[k]) >= LEAST_PIECE_S]
+    pieces = [(k, _fitted(flow[:k], reference[:k]), _fitted(flow[k:], reference[k:])) for k in cuts]
+    if not pieces:
+        return Mended(flown, ())
+    cut, before, after = min(pieces, key=lambda one: one[1][2] + one[2][2])
+    if before[2] + after[2] > BETTER * whole[2] or min(abs(before[0]), abs(after[0])) < 1e-3:
+        return Mended(flown, ())
+    turn = float(np.angle(after[0] / before[0]))
+    drift = abs(after[1] / after[0] - before[1] / before[0])
+    if abs(turn) < TURN_RAD and drift < DRIFT_M_S:
+        return Mended(flown, ())
+    at_s = float(t_s[cut] - 0.5 * BLOCK_S)
+    turned = abs(turn) >= TURN_RAD
+    what = f"is turned by {abs(np.degrees(turn)):.0f} degrees" if turned else f"drifts by {drift:.2f} m/s"
+    early = (cut >= len(t_s) - cut) if turned else abs(before[1]) <= abs(after[1])
+    kept = flown.good & ((flown.t_s < at_s - BESIDE_S) if early else (flown.t_s > at_s + BESIDE_S))
+    used = "before" if early else "after"
+    return Mended(
+        replace(flown, good=kept),
+        (f"{flown.reference_name} {what} from {at_s:.1f} s on; the flight {used} is identified",),
+    )
+
+
+def _blocks(flown: Flight, moved: Motion) -> tuple[Array, Array, Array]:
+    """Means over BLOCK_S of the flow's and the reference's level velocity in earth axes, as complex numbers (m,)."""
+    t_s = flown.t_s[flown.good]
+    seen = t_s - flown.age_s
+    earth = np.einsum("nij,nj->ni", flown.rotation(seen)[:, :2, :2], flown.velocity_m_s[flown.good])
+    reference = on_grid(moved.t_s, moved.velocity_m_s[:, :2], seen)
+    middles = np.arange(t_s[0] + BLOCK_S, t_s[-1] - BLOCK_S, BLOCK_S)
+    after = np.clip(np.searchsorted(t_s, middles), 1, len(t_s) - 1)
+    middles = middles[np.minimum(np.abs(middles - t_s[after - 1]), np.abs(t_s[after] - middles)) < 0.5 * BLOCK_S]
+    means = mean_over(t_s, np.column_stack([earth, reference]), middles - 0.5 * BLOCK_S, middles + 0.5 * BLOCK_S)
+    return middles, means[:, 0] + 1j * means[:, 1], means[:, 2] + 1j * means[:, 3]
+
+
+def _fitted(flow: Array, reference: Array) -> tuple[complex, complex, float]:
+    """flow = gain reference + constant, all complex; and the residual's power."""
+    design = np.column_stack([reference, np.ones(len(reference))])
+    solution = np.linalg.lstsq(design, flow, rcond=None)[0]
+    return complex(solution[0]), complex(solution[1]), float(np.sum(np.abs(flow - design @ solution) ** 2))

@@ -1,0 +1,60 @@
+"""A reference that leaps, stands, drifts or is turned: named with its second, and the scale is that of the rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_identification_flight import GAIN_X, GAIN_Y, written
+
+from flownav.lab.identification.flight_identification import identify_flight
+from flownav.lab.identification.quantities import CANDIDATES
+
+FROM_S, TO_S = 70.2, 85.0
+
+
+def leap(t_s, place):
+    place[t_s > FROM_S, 0] += 6.0
+
+
+def drift(t_s, place):
+    place[:, 1] += 0.8 * np.maximum(t_s - FROM_S, 0.0)
+
+
+def turn(t_s, place):
+    """By 40 degrees; axes of unlike gains make 44 of it."""
+    late = t_s > FROM_S
+    start, (c, s) = place[late][0, :2].copy(), (np.cos(0.7), np.sin(0.7))
+    place[late, :2] = start + (place[late, :2] - start) @ np.array([[c, s], [-s, c]])
+
+
+def stand(t_s, place):
+    still = (t_s > FROM_S) & (t_s < TO_S)
+    place[still] = place[still][0]
+
+
+def sound(t_s, place):
+    """As it is."""
+
+
+@pytest.mark.parametrize(("fault", "said"), [
+    (leap, "truth.csv leaps by 6.0 m"),
+    (drift, "truth.csv drifts by 0.79"),
+    (turn, "truth.csv is turned by 44 degrees"),
+    (stand, "truth.csv stands still"),
+    (sound, ""),
+])  # fmt: skip
+def test_what_is_wrong_with_the_reference_is_named_and_the_gains_are_right(tmp_path, fault, said):
+    folder = written(tmp_path / "flight", turned_rad=0.0)
+    table = np.genfromtxt(folder / "truth.csv", delimiter=",", names=True)
+    place = np.column_stack([table[name] for name in ("x_m", "y_m", "z_m")])
+    fault(table["t_s"], place)
+    rows = np.column_stack([table["t_s"], place])
+    np.savetxt(folder / "truth.csv", rows, delimiter=",", header="t_s,x_m,y_m,z_m", comments="", fmt="%.9g")
+    found = identify_flight(folder, CANDIDATES)
+    notes = [note for note in found.notes if note.startswith("the reference:")]
+    assert len(notes) == bool(said)
+    for note in notes:
+        assert said in note
+        assert min(abs(float(word) - FROM_S) for word in note.split() if word[0].isdigit()) < 1.1
+    for response, gain in zip(found.responses, (GAIN_X, GAIN_Y), strict=True):
+        assert response.gain.value == pytest.approx(gain, abs=0.03)

@@ -176,7 +176,7 @@ def figure(value: Any, form: str = ".2f", scale: float = 1.0) -> str:
 
 
 def with_ends(value: float | None, ends: Iterable[float | None], join: str = "-", form: str = ".3f") -> str:
-    """A figure with its interval in brackets; a dash where there is none, "from" where the upper end is open."""
+    """A figure with its interval in brackets; a dash where there is none, "at least" where the upper end is open."""
     if value is None:
         return "-"
     low, high = ends

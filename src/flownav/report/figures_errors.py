@@ -65,7 +65,8 @@ def velocity_error(record: Record) -> Panel:
 
 
 def _error(record: Record, columns: tuple[str, ...], titles: tuple[str, ...], what: str) -> Panel:
-    key, title = f"{what}-error", f"{what.capitalize()} error"
+    own = " in the filter's own frame" if what == "position" and has(record, "flown") else ""
+    key, title = f"{what}-error", f"{what.capitalize()} error{own}"
     error, beyond = _error_of(record, "estimate", columns), False
     if error is None:
         missing = "truth" if track(record, "truth", columns) is None else "estimate"

@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from command import printed
 from flownav.cli import app
+from flownav.cli.certify import _index
 from flownav.core.errors import InputError, VerdictError
 from requirements import ASKED, HEAD, WINDY, write
 
@@ -100,3 +101,12 @@ def test_a_folder_of_something_else_is_not_written_to(tmp_path):
     failed = run(write(tmp_path, HEAD + CALM + CRASH), "--out", tmp_path / "full")
     assert "full: is there and holds no campaign; give another name" in printed(failed.exception)
     assert [path.name for path in (tmp_path / "full").iterdir()] == ["flight.txt"]
+
+
+def test_an_index_of_too_few_rows_is_no_figure():
+    known = {"input": "wind", "first": 0.3, "first_interval": [0.2, 0.4], "total": 0.5, "total_interval": [0.4, 0.6]}
+    assert _index(known, "input") == "wind: first 0.30 (0.20 to 0.40), total 0.50 (0.40 to 0.60)"
+    half = known | {"first": -0.29, "first_interval": [-0.9, 0.4]}
+    assert _index(half, "input") == "wind: first unknown, total 0.50 (0.40 to 0.60)"
+    few = half | {"total": 1.36, "total_interval": [0.8, 2.0]}
+    assert _index(few, "input") == "wind: first unknown, total unknown: too few rows, give a larger --ranking"

@@ -179,7 +179,8 @@ def lift_off_transient(record: Record, lift_off: Moment) -> Panel:
     if thrust:
         shown = thrust.within(window)
         stack.line(2, "truth", "rotor thrust", shown.t_s, shown.value[:, 0])
-    caption = "How the change of thrust at lift-off disturbs the estimate of w, as in the paper's figure 28."
+    papers = ", as in the paper's figure 28" if record.manifest.get("kind") == "fly" else ""
+    caption = f"How the change of thrust at lift-off disturbs the estimate of w{papers}."
     alt = f"Error of w and rotor thrust around lift-off at {lift_off.t_s:.1f} s."
     return Panel(key, title, caption, alt, stack.chart(window, [lift_off]), wide=True)
 

@@ -193,7 +193,7 @@ def sensor_rows(record: Record) -> list[tuple[str, ...]]:
     """
     scores = mapping(record.manifest.get("scores"))
     spans, judged = mapping(scores.get("coverage")), mapping(scores.get("consistency"))
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for name in dict.fromkeys([*spans, *judged]):
         span, found = mapping(spans.get(name)), mapping(judged.get(name))
         span_s = f"{number(span.get('t0'), 1)} to {number(span.get('t1'), 1)}" if span else NONE

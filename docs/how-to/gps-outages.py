@@ -51,8 +51,9 @@ plt.show()
 
 # %%
 smooth = flownav.replay("samples/flight-csv", gps_outages=[(30, 50)], smooth=True)
-outage = smooth.scores["outages"][0]
-print({name: round(value, 2) for name, value in outage.items() if isinstance(value, float)})
+for name, scores in (("in flight", smooth.scores), ("afterwards", smooth.scores["smoothed"])):
+    truth = scores["truth"]  # this log has one; scores["outages"] are against GPS, which errs itself
+    print(f"{name:10s} {truth['horizontal_rms_m']:.2f} m rms, {truth['horizontal_max_m']:.2f} m at most")
 
 # %% [markdown]
 # [The smoother](../explanation/smoother.md) says how it works.

@@ -22,8 +22,8 @@
 # flownav fly --seed 1 --out sortie.fnr
 
 # %% [markdown]
-# The table has the errors of the position (`x`, `y`, `z` in metres: north, east, down) and of the velocity (`u`,
-# `v`, `w` in m/s: forward, right, down). Below the table stand the touchdown and the verdict.
+# The first line says how it ended. The table has the errors of the position (`x`, `y`, `z` in metres: north, east,
+# down), of the velocity (`u`, `v`, `w` in m/s: forward, right, down) and of the attitude, in flight.
 #
 # Two files were written. `sortie.fnr` is the record, which holds everything that happened. `sortie.html` is its
 # report: one page that works without a network. Open it in a browser.
@@ -46,38 +46,59 @@ print(f"touched {contact['distance_m']:.2f} m from the pad's centre, sinking at 
 # %% [markdown]
 # ## Look at the estimate
 #
-# `record.estimate` is a table: a dictionary of NumPy arrays, whose names end in their units. `pos_d_m` is the
-# position downwards, so that the height is its negative. `std_pos_n_m` is one standard deviation of the position
-# northwards, as the filter itself states it.
+# `record.flown` is a table: a dictionary of NumPy arrays, whose names end in their units. It is what the autopilot
+# flew on: the navigator's estimate of each instant, counted from the pad. `pos_d_m` is the position downwards, so
+# that the height is its negative.
 
 # %%
-estimate = record.estimate.to_pandas()
-estimate[["pos_n_m", "pos_e_m", "pos_d_m", "std_pos_n_m"]].iloc[::500]
+flown = record.flown.to_pandas()
+flown[["pos_n_m", "pos_e_m", "pos_d_m", "vel_u_m_s"]].iloc[::500]
 
 # %% [markdown]
-# `record.truth` is what the vehicle really did. Nothing on board knows it, which is what makes it worth comparing.
+# `record.truth` is what the vehicle really did, from the pad as well. Nothing on board knows it, which is what makes
+# it worth comparing. `judging` says from which instant to which one errors count: from lift-off to touchdown.
 
 # %%
 import matplotlib.pyplot as plt
 
-truth = record.truth.to_pandas()
-error_m = estimate["pos_n_m"] - truth["pos_n_m"].reindex(estimate.index, method="nearest")
+truth, counted = record.truth.to_pandas(), record.judging.to_pandas()["counted"] > 0
+error_m = (flown["pos_n_m"] - truth["pos_n_m"])[counted]
+print(f"north, in flight: {(error_m**2).mean() ** 0.5:.4f} m rms, {error_m.abs().max():.4f} m at most")
 figure, axes = plt.subplots(2, 1, figsize=(8, 5), sharex=True, layout="constrained")
 axes[0].plot(truth.index, -truth["pos_d_m"], label="truth")
-axes[0].plot(estimate.index, -estimate["pos_d_m"], "--", label="estimate")
+axes[0].plot(flown.index, -flown["pos_d_m"], "--", label="estimate")
 axes[0].set_ylabel("height [m]")
 axes[0].legend()
 axes[1].plot(error_m.index, error_m, label="error north")
-axes[1].fill_between(
-    estimate.index, -2 * estimate["std_pos_n_m"], 2 * estimate["std_pos_n_m"], alpha=0.2, label="± 2 std, as stated"
-)
 axes[1].set_ylabel("error [m]")
 axes[1].set_xlabel("time [s]")
 axes[1].legend()
 plt.show()
 
 # %% [markdown]
-# If the filter knows its own errors, the error stays inside the band about 95 % of the time.
+# Those are the figures of the table's row `x`.
+#
+# ## Does it know how wrong it is?
+#
+# The filter states a standard deviation of what it says. Its own table is `record.estimate`. There the position is
+# counted from where GPS puts the flight, metres off; the velocity is the same in both.
+
+# %%
+estimate = record.estimate.to_pandas()
+in_flight = counted.reindex(estimate.index, method="nearest")
+off_m_s = (estimate["vel_w_m_s"] - truth["vel_w_m_s"].reindex(estimate.index, method="nearest"))[in_flight]
+band_m_s = 2 * estimate["std_vel_w_m_s"][in_flight]
+figure, axis = plt.subplots(figsize=(8, 3), layout="constrained")
+axis.plot(off_m_s.index, off_m_s, label="error of the velocity down")
+axis.fill_between(off_m_s.index, -band_m_s, band_m_s, alpha=0.2, label="± 2 std, as stated")
+axis.set_ylabel("error [m/s]")
+axis.set_xlabel("time [s]")
+axis.legend()
+plt.show()
+print(f"inside the band {(off_m_s.abs() <= band_m_s).mean():.0%} of the time")
+
+# %% [markdown]
+# If the filter knows its own errors, they stay inside the band about 95 % of the time.
 #
 # `record.plot` draws the usual figures at once: `position`, `velocity`, `errors`, `innovations` and `path`. They
 # are interactive: zoom into one with the mouse.

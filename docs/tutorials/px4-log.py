@@ -21,13 +21,16 @@
 # flownav info samples/flight.ulg
 
 # %% [markdown]
-# The first line is the verdict. If the flow had swapped axes, a wrong sign or no range beside it, it would stand
-# here. In this log the scale of the flow is below 1: the sensor reads a little too little. The tutorial on
-# [identifying the sensor](flow-sensor.md) puts that right.
+# Below the log's name stand what `flownav explain` found, here a barometer in the rotors' wash, and the verdict of the
+# flow. If the flow had swapped axes, a wrong sign or no range beside it, it would stand there. In this log the scale
+# of the flow is below 1: the sensor reads a little too little. The tutorial on [identifying the
+# sensor](flow-sensor.md) puts that right.
 #
 # ## Fuse it
 #
-# `flownav.replay` runs the same navigator that flies in simulation and in real time.
+# `flownav.replay` runs the same navigator that flies in simulation and in real time. In a terminal, `flownav replay
+# samples/flight.ulg` says of each sensor whether it is as the filter expects, harmless, or something to act on;
+# `--verbose` has the figures.
 
 # %%
 import flownav

@@ -156,6 +156,11 @@ def test_what_numpy_makes_is_a_number(rig):
         flownav.campaign(flights=np.int64(1)).record(np.int64(5))
 
 
+def test_a_misspelt_argument_is_asked_back():
+    with pytest.raises(InputError, match=r"^gps_outage: no argument of replay; did you mean gps_outages\?$"):
+        flownav.replay("x", gps_outage=[(3.0, 4.0)])
+
+
 def test_python_itself_says_what_is_no_argument_at_all():
     with pytest.raises(TypeError, match="nonsense"):
         flownav.replay("x", nonsense=1)

@@ -115,6 +115,8 @@ def test_the_shipped_requirements_can_be_flown(name):
         (HEAD + "[conditions]\nheight_m = [8, 2]\n" + ASKED, "conditions.height_m: a range is [low, high]"),
         (HEAD + '[conditions]\nfault = ["gps_loss", "gps_loss"]\n' + ASKED, "conditions.fault: the same twice"),
         (HEAD + "sped = 3\n" + ASKED, "sped: unknown key"),
+        (HEAD + ASKED.replace("0.5", "-0.3"), "at_most -0.3: no flight has a touchdown.horizontal_m below 0"),
+        (HEAD + "[conditions]\nwind.speed_20ft_m_s = [-5, 4]\n" + ASKED, "a wind's speed begins at 0; where it comes"),
     ],
 )
 def test_mistakes_are_one_line(written, text, said):

@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from command import printed
 from flownav.cli import app
+from flownav.cli.certify import _index
 from flownav.core.errors import InputError, VerdictError
 from requirements import ASKED, HEAD, WINDY, write
 
@@ -116,3 +117,12 @@ def test_a_plan_of_what_cannot_be_flown_is_refused_as_the_flights_are(tmp_path, 
         assert said in str(done.exception)
     assert not (tmp_path / "out").exists()
     assert "f16: no such vehicle" in str(run("approach", "--plan", "--vehicle", "f16").exception)
+
+
+def test_an_index_of_too_few_rows_is_no_figure():
+    known = {"input": "wind", "first": 0.3, "first_interval": [0.2, 0.4], "total": 0.5, "total_interval": [0.4, 0.6]}
+    assert _index(known, "input") == "wind: first 0.30 (0.20 to 0.40), total 0.50 (0.40 to 0.60)"
+    half = known | {"first": -0.29, "first_interval": [-0.9, 0.4]}
+    assert _index(half, "input") == "wind: first unknown, total 0.50 (0.40 to 0.60)"
+    few = half | {"total": 1.36, "total_interval": [0.8, 2.0]}
+    assert _index(few, "input") == "wind: first unknown, total unknown: too few rows, give a larger --ranking"

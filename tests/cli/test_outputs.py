@@ -14,7 +14,7 @@ import pytest
 from rich.console import Console
 
 from flownav.cli import main
-from flownav.cli.output import fitted, table
+from flownav.cli.output import fitted, say, table
 from flownav.core.parameter_files import shipped
 from flownav.core.record import Record
 from replay_logs import log_of_flight
@@ -226,3 +226,19 @@ def test_a_table_fits_the_terminal_and_loses_nothing(columns):
         assert printed.count(f"words_{row[0][-1]}") == 12
     assert all(len(part.columns) > 1 for part in parts)
     assert {tuple(part.columns[0].cells) for part in parts} == {tuple(row[0] for row in rows)}
+
+
+@pytest.mark.parametrize("columns", ["60", "80"])
+def test_where_columns_says_how_wide_it_is_nothing_is_wider(columns, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", columns)
+    rows = [["a cell of many words that may be broken", *(f"{k}.123 (0.045-0.067)" for k in range(6))]]
+    say(table(["cell", *(f"figure {k} [m]" for k in range(6))], rows, left=1), "a line " * 30, wide=144)
+    said = capsys.readouterr().out
+    assert max(map(len, said.splitlines())) <= int(columns)
+    assert all(f"{k}.123 (0.045-0.067)" in said for k in range(6))
+
+
+def test_into_a_pipe_of_no_width_a_table_is_as_wide_as_it_asks(monkeypatch, capsys):
+    monkeypatch.delenv("COLUMNS", raising=False)
+    say(table(["cell", "figure"], [["a", "x" * 100]]), wide=144)
+    assert "x" * 100 in capsys.readouterr().out

@@ -81,6 +81,14 @@ def test_each_log_has_its_estimators_and_each_row_its_keys(garden, hall):
     assert inside["outages"] == {"median_m": None, "worst_m": None, "windows": []}
 
 
+def test_a_log_with_gps_whole_says_what_its_place_shows(garden):
+    whole = " ".join(call(garden, "--outages", "15:35:10").stdout.split())
+    assert "--outages T0:T1:LENGTH cuts GPS" not in whole
+    uncut = " ".join(call(garden).stdout.split())
+    assert "receiver's own slow error" in uncut
+    assert "--outages T0:T1:LENGTH cuts GPS and shows the drift without it." in uncut
+
+
 def test_a_log_with_nothing_to_hold_it_against_says_so(hall, tmp_path):
     bare = Path(shutil.copytree(hall, tmp_path / "bare"))
     (bare / "truth.csv").unlink()

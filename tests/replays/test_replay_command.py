@@ -73,7 +73,7 @@ def test_every_sensor_says_when_it_spoke_and_whether_the_filter_knew_it(folder):
     assert facts["coverage"]["gps_position"] == pytest.approx({"t0": 0.0, "t1": 39.8})
     assert set(facts["consistency"]) <= set(facts["coverage"]) - {"imu"}
     for judged in facts["consistency"].values():
-        assert set(judged) == {"nis_per_dof", "samples", "white"}
+        assert set(judged) == {"nis_per_dof", "samples", "white", "refused"}
         assert judged["nis_per_dof"] > 0.0
         assert judged["samples"] > 0
         assert judged["white"] in (True, False)
@@ -92,7 +92,7 @@ def test_protection_levels_are_told_with_the_share_of_errors_beyond_them(folder,
         words = " ".join(call(log, "--no-report").stdout.split())
         level = found["horizontal_m"]
         assert f"Protection level, horizontal: {level['median']:.2f} m in the median, {level['p95']:.2f} m at" in words
-        assert ("the error is larger and nothing says so 0.00 % of the time" in words) == (unsaid is not None)
+        assert ("The error stayed within it, or a warning stood" in words) == (unsaid is not None)
 
 
 def test_an_error_beyond_the_level_that_nothing_says_is_counted(hall):
@@ -148,7 +148,9 @@ def test_a_sensor_that_falls_silent_is_a_warning_in_all_that_is_said(hall):
     told = call(hall, "--force")
     assert told.exception is None  # a warning is no bad verdict
     assert f"Warning: {said}" in told.stdout
-    assert "Sensors, and their errors as the filter sees them" in told.stdout
+    assert "Rangefinder" in told.stdout
+    assert "refused [%]" not in told.stdout
+    assert "refused [%]" in call(hall, "--force", "--verbose").stdout
     page = Path("out/hall.html").read_text()
     assert said in page
     assert "0.0 to 24.9" in page

@@ -113,15 +113,15 @@ def test_sensors_are_judged_in_words_and_the_drift_at_the_end_is_told() -> None:
     record.manifest["scores"] |= {
         "end_drift_m": 0.417,
         "coverage": {"range": {"t0": 1.0, "t1": 31.25}, "imu": {"t0": 0.0, "t1": 60.0}},
-        "consistency": {"range": {"nis_per_dof": 2.5, "samples": 1234, "white": False}},
+        "consistency": {"range": {"nis_per_dof": 2.5, "samples": 1234, "white": False, "refused": 0.125}},
     }
-    said = "larger than stated, each like the last"
+    said = "act: 1.6 times the scatter that the filter expects, 12 % of it refused in flight"
     assert sensor_rows(record) == [
-        ("Rangefinder", "1.0 to 31.2", "1,234", "2.50", said),
-        ("IMU", "0.0 to 60.0", NONE, NONE, ""),
+        ("Rangefinder", "1.0 to 31.2", "1,234", "2.50", "12.5", said),
+        ("IMU", "0.0 to 60.0", NONE, NONE, NONE, ""),
     ]
     page = render(record)
-    assert "larger than stated: the sensor is trusted too much" in page
+    assert "act: the sensor is trusted too much" in page
     assert "0.417" in page
     assert sensor_rows(Record()) == []
 

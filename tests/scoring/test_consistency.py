@@ -8,14 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from flownav.core.measurement import Sensor
 from flownav.scoring.consistency import (
     HEIGHTS_M,
-    MEANING,
     ConsistencySums,
     ErrorSums,
+    aloft,
     anees,
     band_name,
     chi_square_band,
+    consistency_by_sensor,
     consistency_of,
     consistency_of_block,
     efficiency,
@@ -26,13 +28,12 @@ from flownav.scoring.consistency import (
     is_white,
     lag_one,
     largest_horizontal_error,
-    meanings,
     over_stated,
     steps_in_flight,
-    verdict,
     within_band,
 )
 from flownav.scoring.percentiles import percentile_with_interval
+from flownav.scoring.sensor_verdict import MEANING, meanings, verdict
 
 
 @pytest.mark.parametrize("flights", [1, 10, 1000])
@@ -243,20 +244,42 @@ def test_each_component_is_held_against_its_own_kind():
 
 def test_what_was_not_tested_does_not_count_and_may_leave_nothing():
     assert consistency_of(np.zeros(2), np.array([np.nan, 1.0]), np.array([1.0, np.nan])) is None
-    assert consistency_of(np.zeros(3), np.array([2.0, 9.0, np.nan]), np.array([1.0, 0.0, 1.0])) == (4.0, 1, True)
+    assert consistency_of(np.zeros(3), np.array([2.0, 9.0, np.nan]), np.array([1.0, 0.0, 1.0])) == (4.0, 1, True, 0.0)
 
 
-@pytest.mark.parametrize(("mean", "white", "said"), [
-    (1.0, True, "as stated"),
-    (0.51, True, "as stated"),
-    (1.99, True, "as stated"),
-    (0.49, True, "smaller than stated"),
-    (2.01, True, "larger than stated"),
-    (1.0, False, "each like the last"),
-    (0.1, False, "smaller than stated, each like the last"),
+@pytest.mark.parametrize(("mean", "white", "refused", "said"), [
+    (1.0, True, 0.0, "as expected"),
+    (0.51, True, 0.05, "as expected"),
+    (1.99, True, 0.0, "as expected"),
+    (0.49, True, 0.0, "harmless: less scatter than the filter expects"),
+    (2.01, True, 0.0, "act: 1.4 times the scatter that the filter expects"),
+    (36.0, False, 0.25, "act: 6.0 times the scatter that the filter expects, 25 % of it refused in flight"),
+    (0.1, True, 0.06, "act: 6 % of it refused in flight"),
+    (1.0, False, 0.0, "harmless: its errors last"),
+    (0.1, False, 0.0, "harmless: less scatter than the filter expects, its errors last"),
 ])  # fmt: skip
-def test_the_verdict_in_words(mean, white, said):
-    assert verdict(mean, white=white) == said
-    meant = meanings([said, "as stated"])
-    assert [one.split(":")[0] for one in meant] == [word for word in MEANING if word in said]
-    assert all("stat" in one or "bands" in one for one in meant)
+def test_the_verdict_in_words(mean, white, refused, said):
+    assert verdict(mean, white=white, refused=refused) == said
+    meant = meanings([said, "as expected"])
+    assert [one.split(":")[0] for one in meant] == [word for word in MEANING if said.startswith(word)]
+    assert all("--settings" in one for one in meant)
+
+
+def test_what_was_refused_is_a_share_and_no_part_of_the_mean():
+    """A range that reads 40 sigma off where it is refused, and what is stated where it is fused."""
+    fused = np.arange(100) % 10 > 0
+    innovation = np.where(fused, np.where(np.arange(100) % 2, 1.0, -1.0), 40.0)
+    range_rows = {Sensor.RANGE: np.ones(100, bool)}
+    found = consistency_by_sensor(
+        lambda sensor: range_rows.get(sensor, np.zeros(100, bool)), fused, np.zeros(100), innovation, np.ones(100)
+    )
+    assert list(found) == ["range"]
+    assert found["range"]["nis_per_dof"] == 1.0
+    assert (found["range"]["samples"], found["range"]["refused"]) == (90, 0.1)
+
+
+def test_in_flight_is_what_the_landed_signal_says():
+    t_s, said_s = np.arange(6.0), np.array([0.0, 2.0, 4.0])
+    assert aloft(t_s, said_s, np.array([1.0, 0.0, 1.0])).tolist() == [False, False, True, True, False, False]
+    assert aloft(t_s, said_s, np.ones(3)).all()  # a signal that never says flight is no signal
+    assert aloft(t_s, said_s[:0], said_s[:0]).all()

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from flownav.campaigns.local import takeoff_history
 from flownav.cli import app
-from flownav.cli.fly import takeoff_lines
+from flownav.cli.fly_said import takeoff_lines
 from flownav.scoring.landings import takeoff_of_flight, takeoff_of_flights, takeoffs
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_one
@@ -35,7 +35,7 @@ def test_many_takeoffs_are_a_median_and_a_worst():
     assert (facts["without_flow_s"]["worst"], facts["lost_flow"]) == (0.5, 1)
     assert takeoff_lines(facts, 3) == [
         "take-off  0.200 (0.110..0.290) m over the commanded height, worst 0.300 m",
-        "without flow above half of it  0.00 (0.00..0.45) s, worst 0.50 s, in 1 of 3 flights",
+        "no flow in the upper half of the climb  0.00 (0.00..0.45) s, worst 0.50 s, in 1 of 3 flights",
     ]
 
 

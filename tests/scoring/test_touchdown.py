@@ -75,6 +75,10 @@ def test_a_touch_that_a_go_around_follows_is_no_touchdown():
     aloft = np.where(np.arange(EPOCHS)[:, None] < FLYING, ground, 0.0)
     assert verdict_of(row_of(landing(on_ground=aloft, place_m=place), away=away)) == "went around"
     assert verdict_of(row_of(landing(on_ground=aloft, place_m=place))) != "went around"
+    said = with_reason({"touchdown": flight(landing(on_ground=aloft, place_m=place), away=away)}, 4.0, {})["touchdown"]
+    assert said["reason"] == "broke its landing off 1 time, 4.00 m over the ground when the flight ends"
+    assert said["contact"]["distance_m"] is None
+    assert said["limited_by"] is None
 
 
 def flight(motion, **options):

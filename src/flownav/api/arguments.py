@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, Union, get_args, get_origin
 
 from flownav.core.errors import InputError
+from flownav.core.text import meant
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -29,8 +30,9 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
     def judged(*args: P.args, **kwargs: P.kwargs) -> R:
         try:
             bound = signature.bind(*args, **kwargs)
-        except TypeError:  # Python says it
-            return function(*args, **kwargs)
+        except TypeError:
+            require_known(function.__name__, kwargs, signature)
+            return function(*args, **kwargs)  # Python says it
         for name, value in bound.arguments.items():
             parameter = signature.parameters[name]
             many = parameter.kind in (parameter.VAR_KEYWORD, parameter.VAR_POSITIONAL)
@@ -40,6 +42,15 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
         return function(*bound.args, **bound.kwargs)
 
     return judged
+
+
+def require_known(call: str, given: Mapping[str, Any], signature: inspect.Signature) -> None:
+    """InputError for a keyword that a call does not have where it is like one that it has, which is named."""
+    known = [name for name, one in signature.parameters.items() if one.kind is not one.POSITIONAL_ONLY]
+    for name in given:
+        near = "" if name in known else meant(name, known)
+        if near:
+            raise InputError(f"{name}: no argument of {call}{near}")
 
 
 def _plain(value: Any) -> Any:

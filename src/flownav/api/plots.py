@@ -18,6 +18,7 @@ VELOCITY_TITLES = ("forward [m/s]", "right [m/s]", "down [m/s]")
 COLOURS = {"estimate": "#2a78d6", "truth": "#e08a00", "GPS": "#9aa0a6", "band": "rgba(42,120,214,0.25)"}
 MOST_DOTS = 4000
 SIGMAS = 2.0
+STATED = "2 sigma stated"
 LEGEND = {"orientation": "h", "yanchor": "bottom", "y": 1.0, "xanchor": "right", "x": 1.0}
 LEAST_SHARE = 0.6  # of the longest axis of a path that the shortest one is drawn
 
@@ -50,20 +51,25 @@ def velocity(record: Record) -> Any:
 
 
 def errors(record: Record) -> Any:
-    """Position of the estimate less the truth while it is scored, and twice the standard deviation that is stated."""
+    """Errors of position and velocity while they are scored, within twice the standard deviation that is stated.
+
+    A simulated flight's position is the one that is scored, from where the pad is taken to be: of that none is stated,
+    since the filter's own is from where GPS puts the flight. Velocities are the filter's, at its own instants.
+    """
     if "truth" not in record.tables:
         raise InputError("plot 'errors': the record has no truth; plot 'innovations' shows how GPS disagrees")
-    estimate, truth = record.tables[scored_table(record)], record.tables["truth"]
-    t_s = np.asarray(truth["t_s"], float)
-    error = at_instants(estimate, POSITION_NED, t_s) - _matrix(truth, POSITION_NED)
+    truth, own = record.tables["truth"], record.tables["estimate"]
+    scored, t_s = record.tables[scored_table(record)], np.asarray(truth["t_s"], float)
+    sources = [(scored, POSITION_NED)] + [(own, VELOCITY_BODY)] * (set(VELOCITY_BODY) <= own.keys() & truth.keys())
+    error = np.hstack([at_instants(table, names, t_s) - _matrix(truth, names) for table, names in sources])
     error[~_scored(record, t_s)] = np.nan
-    figure = _rows(f"Errors of position, {_title(record)}", POSITION_TITLES, [Line("estimate", t_s, error)])
-    stated = record.tables.get("estimate", {})
-    if {f"std_{name}" for name in POSITION_NED} <= stated.keys():
-        sigma = SIGMAS * at_instants(stated, tuple(f"std_{name}" for name in POSITION_NED), t_s)
-        sigma[~_scored(record, t_s)] = np.nan
-        for row in range(3):
-            _band(figure, row + 1, t_s, sigma[:, row])
+    titles = (*POSITION_TITLES, *VELOCITY_TITLES)[: error.shape[1]]
+    figure = _rows(f"Errors, {_title(record)}", titles, [Line("estimate", t_s, error)])
+    for row, name in enumerate(name for _, names in sources for name in names):
+        stated = () if scored is not own and name in POSITION_NED else (f"std_{name}",)
+        for column in own.keys() & set(stated):
+            sigma = SIGMAS * at_instants(own, (column,), t_s)[:, 0]
+            _band(figure, row + 1, t_s, np.where(np.isfinite(error[:, row]), sigma, np.nan))
     return figure
 
 
@@ -201,9 +207,10 @@ def _band(figure: Any, row: int, t_s: Array, half: Array) -> None:
     """What is stated, about zero."""
     known = np.isfinite(half)
     around = np.concatenate([half[known], -half[known][::-1]])
+    first = all(trace.name != STATED for trace in figure.data)
     figure.add_scatter(
         x=np.concatenate([t_s[known], t_s[known][::-1]]), y=around, fill="toself", fillcolor=COLOURS["band"],
-        line={"width": 0}, hoverinfo="skip", name="2 sigma stated", legendgroup="band", showlegend=row == 1,
+        line={"width": 0}, hoverinfo="skip", name=STATED, legendgroup="band", showlegend=first,
         row=row, col=1,
     )  # fmt: skip
 

@@ -162,11 +162,13 @@ class Record(ground.Record):
     def plot(self, what: str = "position") -> Any:
         """A Plotly figure: "position", "velocity", "errors", "innovations" or "path".
 
+        Of a simulated flight, paths and errors of position are those that are scored, counted from the pad.
+
         InputError for another word, and where the record lacks what it shows.
 
         Example:
             >>> figure = flownav.fly("landing", flight={"duration_s": 6.0}).plot("errors")
-            >>> figure.layout.xaxis3.title.text
+            >>> figure.layout.xaxis6.title.text
             'time [s]'
         """
         from flownav.api.plots import figure_of

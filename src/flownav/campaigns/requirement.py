@@ -24,6 +24,7 @@ SHIPPED = ("takeoff", "landing", "pad_return", "approach", "approach_8_m_s")
 FOLDER = "requirements"
 OWN_SENSOR, NO_FAULT = "scenario", "none"
 NONE_OF = {CRASH: "no crash", NOT_LANDED: "a landing"}  # a measure that is 0, in words
+WIND = "wind.speed_20ft_m_s"
 USUAL_SEED = 1  # what is drawn then comes of what is asked alone (`certification.cells.seed_of`)
 RANGED = "the requirement's conditions"
 
@@ -52,6 +53,8 @@ class RequirementTable(ParameterModel):
     def _has_one_limit(self) -> RequirementTable:
         if (self.at_most is None) == (self.at_least is None):
             raise ValueError("give one of at_most and at_least")
+        if self.at_most is not None and self.at_most < 0.0:
+            raise ValueError(f"at_most {self.at_most:g}: no flight has a {self.measure} below 0")
         return self
 
     @property
@@ -114,6 +117,14 @@ class Conditions(ParameterModel):
         if len(set(names)) < len(names):
             raise ValueError("the same twice")
         return names
+
+    @field_validator("ranges")
+    @classmethod
+    def _blow(cls, ranges: dict[str, Distribution]) -> dict[str, Distribution]:
+        wind = ranges.get(WIND)
+        if wind is not None and wind.distribution == "uniform" and wind.frozen().support()[0] < 0.0:
+            raise ValueError(f"{WIND}: a wind's speed begins at 0; where it comes from is wind.from_direction_deg")
+        return ranges
 
     @field_validator("height_m")
     @classmethod

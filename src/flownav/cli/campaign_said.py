@@ -95,7 +95,15 @@ def show(summary: dict[str, Any], folder: Path, rate: float | None, records: lis
 
 
 def _of_figure(title: str, name: str) -> Column:
-    return Column(title, lambda cell: _interval(cell["figures"].get(name)))
+    from flownav.campaigns.measures import flights_needed
+
+    needed = flights_needed(name)
+
+    def cell(row: dict[str, Any]) -> str:
+        few = row["flights"] < needed and name in row["figures"]
+        return f"needs {needed} flights" if few else _interval(row["figures"].get(name))
+
+    return Column(title, cell)
 
 
 def _landed(cell: dict[str, Any]) -> str:

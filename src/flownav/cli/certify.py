@@ -213,9 +213,15 @@ def _unit(one: dict[str, Any]) -> str:
     return "" if one["tolerance_bound"] is None else str(one["unit"])
 
 
+WIDEST_INDEX = 0.5  # an index whose interval is wider says nothing
+
+
 def _index(row: dict[str, Any], name: str) -> str:
-    first, total = (
-        f"{which} {row[which]:.2f} ({row[f'{which}_interval'][0]:.2f} to {row[f'{which}_interval'][1]:.2f})"
-        for which in ("first", "total")
-    )
-    return f"{row[name]}: {first}, {total}"
+    """Both indices of an input; no figure of one that the rows of the ranking are too few for."""
+    said = []
+    for which in ("first", "total"):
+        low, high = row[f"{which}_interval"]
+        wide = high - low > WIDEST_INDEX
+        said.append(f"{which} unknown" if wide else f"{which} {row[which]:.2f} ({low:.2f} to {high:.2f})")
+    more = ": too few rows, give a larger --ranking" if all("unknown" in one for one in said) else ""
+    return f"{row[name]}: {', '.join(said)}{more}"

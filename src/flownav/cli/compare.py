@@ -23,6 +23,10 @@ SHORT = (
     "estimator", "place\n[m]", "flying\n[m]", "speed\n[m/s]", "flying\n[m/s]", "end\n[m]", "cut [m]\nmedian",
     "cut [m]\nworst",
 )  # fmt: skip
+WITH_GPS = (
+    "With GPS, place and end show how far the receiver's own slow error carried each estimate, not what flow is worth: "
+    "--outages T0:T1:LENGTH cuts GPS and shows the drift without it."
+)
 TITLE = "rms errors where all estimators of a log have rows; end drift; GPS cuts"
 
 
@@ -143,6 +147,8 @@ def _show(rows: list[dict[str, Any]], written: dict[str, str]) -> None:
         shown.add_row(f"  {estimator}", *figures)
         log = name
     say(shown)
+    if any(row["against"] for row in rows) and all(row["outages"]["median_m"] is None for row in rows):
+        say(WITH_GPS)
     say_files(written, written)
 
 

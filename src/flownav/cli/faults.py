@@ -39,7 +39,7 @@ Faults = Annotated[
 FLOWN_NOTE = (
     "noticed: more refusals in a second than before, or said. said: the navigator warns; in so many flights, "
     "median time after the fault began. unsaid: largest horizontal error before that. landed: also after a climb. "
-    "around: aloft at the end; the rest did not end in time. off: the pad, at rest; median (worst)."
+    "around: aloft at the end; the rest did not end in time. off: the pad, at rest; median (worst). 0: -: in no flight."
 )
 LOGGED_NOTE = (
     "noticed: first rejection, event or flag. moved: from the run without, while it lasts. back: as good as without "
@@ -78,7 +78,9 @@ def command(
         raise InputError(f"--faults {absent[0]}: a receiver's queue sorts that out before its navigator; try --offline")
     flown = _flown(chosen, heights_m, lasting_s, flights, seed, vehicle, not ensemble)
     facts |= {"closed_loop": True, "flights": flights, "truth_model": "ensemble" if ensemble else "matched"}
-    heading = f"Sensors that fail in flight{name}, {flights} flights a row, seed {seed}"
+    heading = (
+        f"Sensors that fail in a hover over the pad{name}, {flights} flights a row, seed {seed}: {_flown_in(vehicle)}"
+    )
     _say(flown, facts, as_json, heading, FLOWN, FLOWN_NOTE)
 
 
@@ -92,6 +94,16 @@ def _say(
         say(table_of(columns, said, left=1, fixed=1, title=title, title_justify="left"), note, wide=WIDE)
 
     answer(facts | {"rows": [row.entry() for row in rows]}, as_json, show)
+
+
+def _flown_in(vehicle: str | None) -> str:
+    """The scenario and the wind of the flights, and what they have no part of."""
+    from flownav.campaigns.faults.flown import scenario_flown
+    from flownav.campaigns.faults.table import BASE
+
+    file = scenario_flown(1.0, vehicle)
+    camera = ", no pad camera" if file.pad_fix is None else ""
+    return f"sensors of {BASE}{camera}, wind {file.wind.speed_20ft_m_s:g} m/s"
 
 
 def _of_fault(title: str, key: str, form: str) -> Column:

@@ -6,6 +6,7 @@ A column of a table is its title, its key in the row, and how its figure is writ
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -176,7 +177,7 @@ def figure(value: Any, form: str = ".2f", scale: float = 1.0) -> str:
 
 
 def with_ends(value: float | None, ends: Iterable[float | None], join: str = "-", form: str = ".3f") -> str:
-    """A figure with its interval in brackets; a dash where there is none, "from" where the upper end is open."""
+    """A figure with its interval in brackets; a dash where there is none, "at least" where the upper end is open."""
     if value is None:
         return "-"
     low, high = ends
@@ -212,16 +213,18 @@ def plain_look(*, edge: bool = True) -> dict[str, Any]:
 def say(*things: Any, wide: int = 0, soft: bool = False) -> None:
     """Print tables and lines. soft: long lines are not broken.
 
-    On a terminal tables fit its width; into a file or a pipe things have `wide` columns at least.
+    On a terminal, and where COLUMNS says how wide one is, tables fit its width; into a file or a pipe things have
+    `wide` columns at least.
     """
     from rich.console import Console
     from rich.table import Table
 
     console = Console(markup=False, highlight=False)
-    if wide and not console.is_terminal:
+    known = console.is_terminal or bool(os.environ.get("COLUMNS"))
+    if wide and not known:
         console.width = max(console.width, wide)
     for thing in things:
-        for part in fitted(thing, console) if isinstance(thing, Table) and console.is_terminal else (thing,):
+        for part in fitted(thing, console) if isinstance(thing, Table) and known else (thing,):
             console.print(part, soft_wrap=soft)
 
 

@@ -37,6 +37,7 @@ OUTAGE_COLUMNS = (
 )
 OUTAGE = "Withhold GPS from T0 to T1 [s]; repeated or with commas."
 OUTAGES = "Windows of LENGTH from T0 to T1 [s]: one replay each, with GPS withheld in it."
+VERBOSE = "Also the figures behind each sensor's verdict, and what was not fused."
 SMOOTH = "Also compute the best estimate after the flight (the smoother)."
 FILTER = "The navigator's filter, an installed one's name, or your own class."
 
@@ -57,6 +58,7 @@ def command(
     out: Annotated[Path | None, out_option("The record", "out/LOG.fnr")] = None,
     force: options.Force = False,
     report: options.Report = True,
+    verbose: Annotated[bool, switch(VERBOSE, "--verbose")] = False,
     as_json: options.Json = False,
 ) -> None:
     """Fuse a recorded flight: its trajectory, its errors against its own GPS, and the drift through GPS outages."""
@@ -82,7 +84,7 @@ def command(
     if report and not read.fed:
         record.manifest["explained"] = _explained(read)
     scores = record.scores | save(record, record_path, report=report)
-    answer(scores, as_json, lambda: show(record, scores))
+    answer(scores, as_json, lambda: show(record, scores, verbose=verbose))
     if record.verdict:
         raise VerdictError(f"{log}: {record.verdict}")
 
@@ -125,15 +127,15 @@ def numbers(option: str, text: str, separator: str, count: int, form: str) -> tu
     return found
 
 
-def show(record: Record, scores: dict[str, Any]) -> None:
+def show(record: Record, scores: dict[str, Any], *, verbose: bool = False) -> None:
     """Print the figures for people."""
     say(f"{record.manifest['log']}: {scores['duration_s']:.1f} s")
     if scores["outages"]:
         say(table_of(OUTAGE_COLUMNS, scores["outages"], title="Horizontal error through GPS outages"))
     say(*error_lines(scores))
-    say(*_sensors(scores))
+    say(*_sensors(scores, verbose=verbose))
     rejected = _rejected(scores)
-    if rejected.row_count:
+    if rejected.row_count and verbose:
         say(rejected)
     say(*(f"Note: {note}" for note in record.manifest["notes"]))
     say(*(f"{finding['label']}: {finding['text']}" for finding in record.manifest["findings"]))
@@ -177,21 +179,27 @@ def autopilot_errors(scores: dict[str, Any]) -> str:
     )
 
 
-def _sensors(scores: dict[str, Any]) -> list[Any]:
-    """When each sensor gave readings, and whether its errors are as large as the filter states; what that means."""
-    from flownav.scoring.consistency import meanings, verdict
+def _sensors(scores: dict[str, Any], *, verbose: bool) -> list[Any]:
+    """A verdict a sensor, and what that means; verbose: when it gave readings, and the figures behind the verdict."""
+    from flownav.report.figures_innovation import SENSOR_TITLES
+    from flownav.scoring.sensor_verdict import meanings, verdict
 
     rows = []
     for name in dict.fromkeys([*scores["coverage"], *scores["consistency"]]):
         span, judged = scores["coverage"].get(name), scores["consistency"].get(name)
-        tested = nis = words = ""
+        fused = nis = refused = words = ""
         if judged:
             mean = judged["nis_per_dof"]
-            tested, nis = str(judged["samples"]), "< 0.01" if mean < 0.005 else figure(mean)
-            words = verdict(mean, white=judged["white"])
-        rows.append((name, f"{span['t0']:.1f}, {span['t1']:.1f}" if span else "", tested, nis, words))
-    heads = ("sensor", "from, to [s]", "tested", "NIS", "its errors are")
-    return [table(heads, rows, title="Sensors, and their errors as the filter sees them"),
+            fused, nis = str(judged["samples"]), "< 0.01" if mean < 0.005 else figure(mean)
+            refused = figure(judged["refused"], ".1f", 100.0)
+            words = verdict(mean, white=judged["white"], refused=judged["refused"])
+        title = SENSOR_TITLES.get(name, name.replace("_", " "))
+        rows.append((title, f"{span['t0']:.0f}, {span['t1']:.0f}" if span else "", fused, nis, refused, words))
+    heads = ("sensor", "from, to [s]", "fused", "NIS", "refused [%]", "in flight")
+    shown = rows if verbose else [row for row in rows if row[-1]]
+    kept = range(len(heads)) if verbose else (0, len(heads) - 1)
+    look = plain_look(edge=False)
+    return [table([heads[k] for k in kept], ([row[k] for k in kept] for row in shown), fixed=1, **look),
             *(f"  {said}" for said in meanings(row[-1] for row in rows))]  # fmt: skip
 
 
@@ -199,7 +207,8 @@ def _protection(found: dict[str, Any]) -> str:
     """Protection levels in words."""
     level, unsaid = found["horizontal_m"], found["exceeded_unsaid_fraction"]
     said = f"Protection level, horizontal: {level['median']:.2f} m in the median, {level['p95']:.2f} m at 95 %"
-    late = "" if unsaid is None else f"; the error is larger and nothing says so {100.0 * unsaid:.2f} % of the time"
+    late = "" if unsaid is None else ". The error stayed within it, or a warning stood"
+    late = f". The error was above it without a warning {100.0 * unsaid:.2f} % of the time" if unsaid else late
     return said + late
 
 
@@ -207,10 +216,10 @@ def _rejected(scores: dict[str, Any]) -> Any:
     """What was not fused and why, in readings and in components (a row that the reader threw away is one)."""
     rows = []
     for sensor, counted in scores["readings"].items():
-        offered, components = counted["offered"], scores["rejected"].get(sensor, {})
+        read, components = counted["read"], scores["rejected"].get(sensor, {})
         for reason, count in counted["rejected"].items():
-            rows.append((sensor, reason, str(count), str(offered or ""), str(components.get(reason, ""))))
-    return table(("sensor", "reason", "readings", "of", "components"), rows, title="Not fused")
+            rows.append((sensor, reason, str(count), str(read), str(components.get(reason, ""))))
+    return table(("sensor", "reason", "readings", "of those read", "components"), rows, title="Not fused")
 
 
 def _smoothed_errors(scores: dict[str, Any]) -> str:

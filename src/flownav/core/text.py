@@ -33,9 +33,9 @@ def finite_or_none(value: float | None) -> float | None:
 
 
 def interval_words(low: float | None, high: float | None, form: str = ".3f", join: str = " to ") -> str:
-    """An interval's two ends; of one that too few flights leave open, the end that there is: "from 0.110"."""
+    """An interval's two ends; of one that too few flights leave open, the end that there is: "at least 0.110"."""
     if low is None or high is None:
-        ends = [f"{word} {end:{form}}" for word, end in (("from", low), ("to", high)) if end is not None]
+        ends = [f"{word} {end:{form}}" for word, end in (("at least", low), ("at most", high)) if end is not None]
         return ends[0] if ends else "anything"
     return f"{low:{form}}{join}{high:{form}}"
 

@@ -18,7 +18,7 @@ from flownav.navigation.reasons import HORIZONTAL, REFUSALS
 from flownav.navigation.rows import InnovationRow
 from flownav.replays.prepare import GPS
 from flownav.replays.sentinel import Finding
-from flownav.scoring.consistency import consistency_by_sensor
+from flownav.scoring.consistency import aloft, consistency_by_sensor
 from flownav.scoring.coverage import coverage_of
 from flownav.scoring.path import autopilot_errors, moved_by, placed_in
 from flownav.scoring.reference import Alignment, flight_of
@@ -88,12 +88,17 @@ def obstacles(log: Log) -> list[str]:
     return found
 
 
-def consistency_scores(innovation: Array) -> dict[str, dict[str, Any]]:
-    """By sensor, of the components that were held against their prediction; innovation: rows of a tape's."""
+def consistency_scores(innovation: Array, landed: Stream | None = None) -> dict[str, dict[str, Any]]:
+    """By sensor, of the components that were held against their prediction in flight; innovation: rows of a tape's.
+
+    landed: what says when it flies; all of it is flight without.
+    """
     offered = InnovationRow.of(innovation)
     tested = np.isin(offered.reason, TESTED)
+    if landed is not None:
+        tested &= aloft(offered.t_s, landed.t_s, landed.value[:, 0])
     return consistency_by_sensor(
-        lambda sensor: tested & (offered.sensor == sensor),
+        lambda sensor: tested & (offered.sensor == sensor), offered.reason == Reason.FUSED,
         offered.component, offered.innovation, offered.innovation_variance,
     )  # fmt: skip
 
@@ -117,8 +122,9 @@ def told(innovation: Array) -> Array:
 def reading_scores(innovation: Array, streams: Mapping[Sensor, Stream]) -> dict[str, dict[str, Any]]:
     """By sensor, what became of whole readings, where `rejected` counts components; innovation: rows of a tape's.
 
-    offered to the filter; fused: with every component, or with some of them (in_part); rejected: readings that lost
-    one component or more, by reason, with the rows that the reader threw away.
+    offered to the filter; read: these and the rows that the reader threw away; fused: with every component, or with
+    some of them (in_part); rejected: readings that lost one component or more, by reason, with the rows that the reader
+    threw away.
     """
     found = {}
     innovation = told(innovation)
@@ -133,6 +139,7 @@ def reading_scores(innovation: Array, streams: Mapping[Sensor, Stream]) -> dict[
         if count or rejected:
             found[sensor.name.lower()] = {
                 "offered": count,
+                "read": count + sum(stream.rejected.values()),
                 "fused": int(np.count_nonzero((fused == components) & (fused > 0))),
                 "in_part": int(np.count_nonzero((fused < components) & (fused > 0))),
                 "rejected": rejected,

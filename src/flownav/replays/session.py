@@ -130,7 +130,7 @@ class Replay:
         warned = flagged(self.said.t_s, flags_of(self.written.event))
         scores: dict[str, Any] = {
             **estimate_scores(self.table, self.references, end - start, warned),
-            "consistency": judged.consistency_scores(self.innovation),
+            "consistency": judged.consistency_scores(self.innovation, self.log.streams.get(Sensor.LANDED)),
             "coverage": judged.coverage_scores(self.log),
             "rejected": self.rejected(),
             "readings": judged.reading_scores(self.innovation, self.log.streams),

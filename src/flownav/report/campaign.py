@@ -155,7 +155,7 @@ HEADLINES = {"pass": "Pass", "fail": "Fail", "not shown": "Not shown"}
 SENTENCES = {
     "pass": "The flights show every requirement below.",
     "fail": "The flights show that a requirement below is not met.",
-    "not shown": "The flights show neither that every requirement below is met nor that one is not.",
+    "not shown": "These flights are too few, or too near a limit, to decide every requirement below.",
 }
 MOST_NAMED = 6  # files of a folder that are hashed one by one on the page
 SIGNERS = ("Prepared by", "Checked by", "Approved by")

@@ -61,7 +61,7 @@ def touchdowns(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> Panel:
     without, beyond = int((~touched).sum()), int((away > far).sum())
     caption = f"{'At rest' if shown['of'] == 'rest' else 'First contact'}, about the pad's centre."
     caption += f" Without a touchdown that counts: {without} of {len(north)} flights." if without else ""
-    caption += f" {beyond} lie beyond the picture; zoom out to see them." if beyond else ""
+    caption += f" {beyond} of {len(north)} flights touched beyond the picture's edge." if beyond else ""
     alt = f"Scatter of {int(touched.sum())} touchdowns about the pad's centre; {int(bad.sum())} flights do not meet it."
     return Panel(key, title, caption, alt, drawing(data, look))
 

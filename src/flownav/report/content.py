@@ -13,6 +13,7 @@ from flownav.core.record import Record, mapping
 from flownav.report import series
 from flownav.report.panels import NONE, Part, Tile, metres, number
 from flownav.report.series import has, readings
+from flownav.scoring.headline import sentence
 
 UNIT_AFTER_NUMBER = re.compile(r"(\d) (m/s|m|s)\b")
 AXES = {"x": "north", "y": "east", "z": "height"}
@@ -52,6 +53,8 @@ def summary(record: Record) -> str:
     manifest, scores = record.manifest, mapping(record.manifest.get("scores"))
     said = [KINDS.get(str(manifest.get("kind")), "A flight of {}.").format(f"{duration_s(record):.1f} s")]
     said += landing_sentences(mapping(scores.get("touchdown")))
+    headline = sentence(manifest, scores) if manifest.get("kind") == "fly" else ""
+    said = [headline, *said] if headline else said
     largest = scores.get("max_position_error_m")
     if largest is not None:
         published = mapping(manifest.get("paper")).get("max_position_error_m")

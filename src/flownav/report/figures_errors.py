@@ -65,7 +65,8 @@ def velocity_error(record: Record) -> Panel:
 
 
 def _error(record: Record, columns: tuple[str, ...], titles: tuple[str, ...], what: str) -> Panel:
-    key, title = f"{what}-error", f"{what.capitalize()} error"
+    own = " in the filter's own frame" if what == "position" and has(record, "flown") else ""
+    key, title = f"{what}-error", f"{what.capitalize()} error{own}"
     error, beyond = _error_of(record, "estimate", columns), False
     if error is None:
         missing = "truth" if track(record, "truth", columns) is None else "estimate"
@@ -178,7 +179,8 @@ def lift_off_transient(record: Record, lift_off: Moment) -> Panel:
     if thrust:
         shown = thrust.within(window)
         stack.line(2, "truth", "rotor thrust", shown.t_s, shown.value[:, 0])
-    caption = "How the change of thrust at lift-off disturbs the estimate of w, as in the paper's figure 28."
+    papers = ", as in the paper's figure 28" if record.manifest.get("kind") == "fly" else ""
+    caption = f"How the change of thrust at lift-off disturbs the estimate of w{papers}."
     alt = f"Error of w and rotor thrust around lift-off at {lift_off.t_s:.1f} s."
     return Panel(key, title, caption, alt, stack.chart(window, [lift_off]), wide=True)
 

@@ -8,7 +8,9 @@ from flownav.report.chart import Stack, sliding_mean, sliding_rms
 from flownav.report.figures_innovation import SENSOR_TITLES, innovation_table
 from flownav.report.panels import Panel, number
 from flownav.report.series import Track, difference, moments, outages, readings, start_end_s, track
-from flownav.scoring.consistency import MODEST_SQUARES, SCORED, chi_square_band, consistency_of, verdict
+from flownav.scoring.consistency import MODEST_SQUARES, SCORED, chi_square_band
+from flownav.scoring.recorded import consistency_in
+from flownav.scoring.sensor_verdict import verdict
 
 STD_POSITION = tuple(f"std_{name}" for name in POSITION_NED)
 RADIUS_WINDOW_S = 5.0
@@ -107,9 +109,7 @@ def normalised_innovations(record: Record) -> list[Panel]:
     if not sensors:
         return []
     span = start_end_s(record)
-    stack = Stack(
-        [f"{_sensor_title(name)}: {_judged(record, name, table[name])}" for name in sensors], row_height_px=92
-    )
+    stack = Stack([f"{_sensor_title(name)}: {_judged(record, name)}" for name in sensors], row_height_px=92)
     for row, squares in enumerate(sensors.values(), 1):
         mean = np.maximum(sliding_mean(squares.t_s, squares.value[:, 0], NIS_WINDOW_S), SMALLEST_NIS)
         for limit in MODEST_SQUARES:
@@ -120,7 +120,7 @@ def normalised_innovations(record: Record) -> list[Panel]:
     caption = (
         f"Innovations squared over their stated variance (NIS), a mean over a sliding {NIS_WINDOW_S:.0f} s: 1 is a "
         "filter that knows its errors, above 2 it is too sure of itself, below 1/2 it is too careful. Above each axis: "
-        "the mean over the whole record and its verdict."
+        "the mean of what was fused in flight, and its verdict."
     )
     title = "Are the innovations as large as stated?"
     alt = f"Mean normalised innovation squared of each sensor over time. {caption}"
@@ -131,21 +131,14 @@ def _sensor_title(name: str) -> str:
     return SENSOR_TITLES.get(name, name.replace("_", " "))
 
 
-def _judged(record: Record, name: str, parts: dict[str, dict[str, Array]]) -> str:
+def _judged(record: Record, name: str) -> str:
     """A sensor's mean NIS and verdict in words, as the record scores it or, where it does not, by the same rules."""
-    scored = mapping(mapping(mapping(record.manifest.get("scores")).get("consistency")).get(name))
-    if scored:
-        mean, white = float(scored.get("nis_per_dof") or 0.0), bool(scored.get("white"))
-    else:
-        whole = [part for part in parts.values() if "innovation" in part and "innovation_variance" in part]
-        component = np.concatenate([np.full(len(part["t_s"]), k) for k, part in enumerate(whole)])
-        innovation, variance = (np.concatenate([part[column] for part in whole])
-                                for column in ("innovation", "innovation_variance"))  # fmt: skip
-        found = consistency_of(component, innovation, variance)
-        if found is None:
-            return "too few to judge"
-        mean, white = found.nis_per_dof, found.white
-    return f"{number(mean, 2)}, {verdict(mean, white=white)}"
+    told = mapping(mapping(record.manifest.get("scores")).get("consistency")) or consistency_in(record)
+    scored = mapping(told.get(name))
+    if not scored:
+        return "not judged: none fused in flight"
+    mean, refused = float(scored.get("nis_per_dof") or 0.0), float(scored.get("refused") or 0.0)
+    return f"{number(mean, 2)}, {verdict(mean, white=bool(scored.get('white')), refused=refused)}"
 
 
 def _squares(parts: dict[str, dict[str, Array]]) -> Track | None:

@@ -29,8 +29,8 @@ from flownav.report.panels import Panel, Section
 from flownav.report.series import Window, first_pad_fix_s, has, moments, outages, start_end_s
 from flownav.report.spectrum import spectrum
 from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE, Drawing
-from flownav.scoring.consistency import meanings
 from flownav.scoring.phases import Phase, phases_of
+from flownav.scoring.sensor_verdict import meanings
 
 HERE = Path(__file__).parent
 PLOTLY = "plotly.min.js"

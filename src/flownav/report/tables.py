@@ -10,9 +10,9 @@ from flownav.core.record import Record, mapping
 from flownav.report import series
 from flownav.report.figures_innovation import SENSOR_TITLES
 from flownav.report.panels import NONE, number
-from flownav.scoring.consistency import verdict
 from flownav.scoring.phases import Phase, phase_at
 from flownav.scoring.recorded import rejected_mostly_in, scores_by_phase
+from flownav.scoring.sensor_verdict import verdict
 
 EVENTS_LISTED = 300
 
@@ -166,7 +166,7 @@ def phases_within(phases: Sequence[Phase], t0: float, t1: float) -> str:
 
 
 def rejected_rows(record: Record, phases: Sequence[Phase] = ()) -> list[tuple[str, str, str, str, str]]:
-    """What was not fused, as (sensor, reason, readings, components, phase of most), most components first.
+    """What was not fused, as (sensor, reason, readings and of how many, components, phase of most), most first.
 
     Records from before readings were counted have components only.
     """
@@ -174,28 +174,34 @@ def rejected_rows(record: Record, phases: Sequence[Phase] = ()) -> list[tuple[st
     readings_of = mapping(scores.get("readings"))
     rows = []
     for sensor, reasons in mapping(scores.get("rejected")).items():
-        whole = mapping(mapping(readings_of.get(sensor)).get("rejected"))
-        rows += [(sensor, reason, whole.get(reason), count) for reason, count in mapping(reasons).items()]
+        counted = mapping(readings_of.get(sensor))
+        whole, read = mapping(counted.get("rejected")), counted.get("read")
+        of = f" of {read:,}" if isinstance(read, int) else ""
+        rows += [(sensor, reason, whole.get(reason), count, of) for reason, count in mapping(reasons).items()]
     rows.sort(key=lambda row: -float(row[3]))
     mostly = rejected_mostly_in(record, phases)
     return [
-        (SENSOR_TITLES.get(s, s.replace("_", " ")), r.replace("_", " "), NONE if n is None else f"{n:,}", f"{c:,}",
+        (SENSOR_TITLES.get(s, s.replace("_", " ")), r.replace("_", " "), NONE if n is None else f"{n:,}{of}", f"{c:,}",
          mostly.get((s, r), NONE))
-        for s, r, n, c in rows
+        for s, r, n, c, of in rows
     ]  # fmt: skip
 
 
-def sensor_rows(record: Record) -> list[tuple[str, str, str, str, str]]:
-    """Sensors as (name, from and to in seconds, innovations tested, their mean square per component, verdict)."""
+def sensor_rows(record: Record) -> list[tuple[str, ...]]:
+    """Sensors as (name, from and to in seconds, components fused in flight, their mean square, share refused [%],
+    verdict).
+    """
     scores = mapping(record.manifest.get("scores"))
     spans, judged = mapping(scores.get("coverage")), mapping(scores.get("consistency"))
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for name in dict.fromkeys([*spans, *judged]):
         span, found = mapping(spans.get(name)), mapping(judged.get(name))
         span_s = f"{number(span.get('t0'), 1)} to {number(span.get('t1'), 1)}" if span else NONE
-        mean, tested, said = NONE, NONE, ""
+        mean, tested, lost, said = NONE, NONE, NONE, ""
         if found:
             mean, tested = number(found.get("nis_per_dof"), 2), f"{found.get('samples') or 0:,}"
-            said = verdict(float(found.get("nis_per_dof") or 0.0), white=bool(found.get("white")))
-        rows.append((SENSOR_TITLES.get(name, name.replace("_", " ")), span_s, tested, mean, said))
+            refused = float(found.get("refused") or 0.0)
+            lost = number(100.0 * refused, 1)
+            said = verdict(float(found.get("nis_per_dof") or 0.0), white=bool(found.get("white")), refused=refused)
+        rows.append((SENSOR_TITLES.get(name, name.replace("_", " ")), span_s, tested, mean, lost, said))
     return rows

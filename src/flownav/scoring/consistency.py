@@ -10,7 +10,7 @@ Sums, not flights, are kept: memory does not grow with the number of flights.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
@@ -99,12 +99,14 @@ def consistency_of_block(error: Array, sigma: Array, nees: Array, height_m: Arra
 
 # -- one flight, by its innovations -----------------------------------------------------------------------
 class InnovationConsistency(NamedTuple):
-    """Consistency of a sensor in a flight: the mean normalised innovation squared of its tested components (1 where
-    the filter states its errors rightly), how many were tested, and whether each one is news, unlike the one before."""
+    """Consistency of a sensor in a flight: the mean normalised innovation squared of its components (1 where the filter
+    states its errors rightly), how many they are, whether each one is news, unlike the one before, and which share of
+    those that were tested lay outside the gate and is not among them."""
 
     nis_per_dof: float
     samples: int
     white: bool
+    refused: float = 0.0
 
 
 def consistency_of(component: NDArray[Any], innovation: Array, variance: Array) -> InnovationConsistency | None:
@@ -123,16 +125,31 @@ def consistency_of(component: NDArray[Any], innovation: Array, variance: Array) 
 
 
 def consistency_by_sensor(
-    rows_of: Callable[[Sensor], NDArray[np.bool_]], component: NDArray[Any], innovation: Array, variance: Array
-) -> dict[str, dict[str, Any]]:
-    """The consistency of each sensor that has tested components, by its name. rows_of: which rows are a sensor's."""
+    rows_of: Callable[[Sensor], NDArray[np.bool_]], fused: NDArray[np.bool_], component: NDArray[Any],
+    innovation: Array, variance: Array,
+) -> dict[str, dict[str, Any]]:  # fmt: skip
+    """The consistency of each sensor that has fused components, by its name.
+
+    rows_of: which rows of the tested components are a sensor's; fused (n,): which of them lay inside the gate. What
+    was refused was not believed: it tells of the sensor, by its share, and not of what the filter states.
+    """
     found = {}
     for sensor in Sensor:
         rows = rows_of(sensor)
-        judged = consistency_of(component[rows], innovation[rows], variance[rows])
+        kept = rows & fused
+        judged = consistency_of(component[kept], innovation[kept], variance[kept])
         if judged is not None:
-            found[sensor.name.lower()] = judged._asdict()
+            refused = float(np.count_nonzero(rows & ~fused) / np.count_nonzero(rows))
+            found[sensor.name.lower()] = judged._replace(refused=refused)._asdict()
     return found
+
+
+def aloft(t_s: Array, said_s: Array, landed: Array) -> NDArray[np.bool_]:
+    """Which instants (n,) are in flight by a signal (m,) that is 1 on the ground; all where it tells of no flight."""
+    if not len(said_s) or not (landed < 0.5).any():
+        return np.ones(len(t_s), bool)
+    row = np.clip(np.searchsorted(said_s, t_s, side="right") - 1, 0, len(said_s) - 1)
+    return np.asarray(landed[row] < 0.5)
 
 
 def is_white(normalised: Array) -> bool:
@@ -145,32 +162,6 @@ def lag_one(normalised: Array) -> float:
     """Autocorrelation of neighbours about zero, -1 to 1: an innovation's mean is zero, and a bias is colour too."""
     power = float(np.sum(normalised**2))
     return float(np.sum(normalised[1:] * normalised[:-1])) / power if power > 0.0 else 0.0
-
-
-SMALLER, LARGER, LASTING = "smaller than stated", "larger than stated", "each like the last"
-MEANING = {
-    SMALLER: "safe to fly on, since no band is too narrow; the sensor could be trusted more: state a smaller noise.",
-    LARGER: "the sensor is trusted too much and bands are too narrow: state a larger noise, or see `flownav explain`.",
-    LASTING: "a bias, a wrong delay or slow noise stays in it: averaging helps less than the bands say.",
-}  # what each of these says of an estimate's use, and what to do about it
-
-
-def verdict(nis_per_dof: float, *, white: bool) -> str:
-    """What a sensor's errors are as the filter sees them: smaller or larger than stated, each like the last, or so."""
-    said = []
-    if nis_per_dof < MODEST_SQUARES[0]:
-        said.append(SMALLER)
-    if nis_per_dof > MODEST_SQUARES[1]:
-        said.append(LARGER)
-    if not white:
-        said.append(LASTING)
-    return ", ".join(said) or "as stated"
-
-
-def meanings(verdicts: Iterable[str]) -> list[str]:
-    """What the verdicts at hand mean for use and what to do, a sentence for each that occurs."""
-    found = list(verdicts)
-    return [f"{word}: {meaning}" for word, meaning in MEANING.items() if any(word in said for said in found)]
 
 
 # -- many flights, by their errors -----------------------------------------------------------------------

@@ -19,6 +19,7 @@ from flownav.scoring.touchdown import CONTACT, LIMITED_BY, REST, TOUCHDOWN_COLUM
 
 R_SHARE = 0.95
 NEVER_LANDED = "never landed"  # the verdict of one flight that was to land and never touched
+WENT_AROUND = "went around"  # of one that broke its landing off and is aloft at the end
 AT_GATE_M = 0.35  # so near a gate's height a vehicle waits there: a search stays up to 0.3 m above its own
 CONFIDENCE = 0.95
 EXPECTED, BROKEN, GO_AROUNDS, ALOFT = (
@@ -47,7 +48,8 @@ def succeeded(rows: Array) -> NDArray[np.bool_]:
 def touchdown_of_flight(row: Array) -> dict[str, Any] | None:
     """The values of one flight; None where it was not to land, touched nothing, broke nothing and did not go around.
 
-    Of a flight that never landed contact and rest are groups of nulls; else what did not happen is null.
+    Of a flight that never landed, or is aloft after a go-around, contact and rest are groups of nulls; otherwise what
+    did not happen is null.
     """
     broken, touched = names_of(row[BROKEN]), bool(np.isfinite(row[CONTACT_DISTANCE]))
     if not row[EXPECTED] and not touched and not broken and not row[ALOFT]:
@@ -60,7 +62,8 @@ def touchdown_of_flight(row: Array) -> dict[str, Any] | None:
     verdict = NEVER_LANDED if verdict == "unfinished" and not touched else verdict
     for group, figures in said.items():
         nothing = all(figure is None for figure in figures.values())
-        said[group] = None if nothing and (verdict != NEVER_LANDED or group == "limited_by") else figures
+        aloft = verdict in (NEVER_LANDED, WENT_AROUND) and group != "limited_by"
+        said[group] = None if nothing and not aloft else figures
     return said | {"success": landed, "broken": broken, "go_arounds": times, "verdict": verdict}
 
 
@@ -70,14 +73,16 @@ def with_reason(scores: dict[str, Any], height_m: float, facts: Mapping[str, Any
     height_m: of the skids over the ground at the end; facts: what the flight's judging says of its gates.
     """
     landing = scores["touchdown"]
-    if landing is None or landing["verdict"] != NEVER_LANDED:
+    if landing is None or landing["verdict"] not in (NEVER_LANDED, WENT_AROUND):
         return scores
     where = f"{height_m:.2f} m over the ground when the flight ends"
     for name, words in (("search_height_m", "looks for its pad from"), ("align_height_m", "waits at the gate of")):
         gate_m = float(facts.get(name, 0.0))
         if gate_m > 0.0 and abs(height_m - gate_m) < AT_GATE_M:
             where = f"{words} {gate_m:g} m, {where}"
-    return scores | {"touchdown": landing | {"reason": where}}
+    times = landing["go_arounds"]
+    often = f"broke its landing off {times} time{'s' * (times > 1)}, " if landing["verdict"] == WENT_AROUND else ""
+    return scores | {"touchdown": landing | {"reason": often + where}}
 
 
 def touchdown_of_flights(rows: Array) -> dict[str, Any] | None:
@@ -115,7 +120,7 @@ def verdict_of(row: Array) -> str:
         return "crashed"
     if succeeded(row[None, :])[0]:
         return "landed"
-    return "went around" if row[ALOFT] > 0.0 else "unfinished"
+    return WENT_AROUND if row[ALOFT] > 0.0 else "unfinished"
 
 
 def went_around(rows: Array) -> dict[str, int]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flownav.core.errors import InputError
 from flownav.core.measurement import COLUMNS, Array, Sensor
 from flownav.core.record import POSITION_NED, PROTECTION_LEVELS, QUATERNION, VELOCITY_BODY, Column, Record
-from flownav.scoring.consistency import consistency_by_sensor
+from flownav.scoring.consistency import aloft, consistency_by_sensor
 from flownav.scoring.errors import (
     MAX_POSITION_ERROR,
     STATISTICS,
@@ -191,14 +191,26 @@ def _readings(record: Record, sensor: Sensor) -> tuple[Array, Array] | None:
 
 
 def consistency_in(record: Record) -> dict[str, dict[str, Any]]:
-    """By sensor, whether the innovations of the components that were tested are as large as the filter states."""
+    """By sensor, whether the innovations that were fused in flight are as large as the filter states."""
     table = record.tables.get("innovation")
-    if table is None:  # another estimate states none
+    needed = {"sensor", "component", "reason", "innovation", "innovation_variance"}
+    if table is None or not needed <= table.keys():  # another estimate states none
         return {}
-    sensor, tested = np.asarray(table["sensor"], str), np.isin(np.asarray(table["reason"], str), TESTED)
+    sensor, reason = np.asarray(table["sensor"], str), np.asarray(table["reason"], str)
+    tested = np.isin(reason, TESTED) & _aloft(record, np.asarray(table["t_s"], float))
     component = np.unique(np.asarray(table["component"], str), return_inverse=True)[1]
     news, variance = (np.asarray(table[name], float) for name in ("innovation", "innovation_variance"))
-    return consistency_by_sensor(lambda each: tested & (sensor == each.name.lower()), component, news, variance)
+    fused = reason == TESTED[0]
+    return consistency_by_sensor(lambda each: tested & (sensor == each.name.lower()), fused, component, news, variance)
+
+
+def _aloft(record: Record, t_s: Array) -> NDArray[np.bool_]:
+    """Which instants (n,) are in flight: by the truth of a simulated one, else by what its landed signal says."""
+    for name, column in (("truth", "on_ground"), ("landed", "landed")):
+        table = record.tables.get(name, {})
+        if column in table:
+            return aloft(t_s, np.asarray(table["t_s"], float), np.asarray(table[column], float))
+    return np.ones(len(t_s), bool)
 
 
 class PhaseScores(NamedTuple):

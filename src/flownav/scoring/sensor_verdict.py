@@ -1,0 +1,37 @@
+"""What the consistency of a sensor's innovations means to those who fly with it: harmless, or something to act on."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from flownav.scoring.consistency import MODEST_SQUARES
+
+MANY_REFUSED = 0.05  # of a sensor's values outside the gate: chance refuses less than one in a hundred
+GOOD, HARMLESS, ACT = "as expected", "harmless", "act"
+MEANING = {
+    HARMLESS: "the stated errors are large enough; of a sensor with less scatter a smaller noise may be stated in "
+    "--settings, and errors that last are averaged less than it seems.",
+    ACT: "the sensor is trusted too much, or does not fit the others: `flownav explain` looks for the cause; without "
+    "one state a larger noise in --settings.",
+}  # what each of these says of an estimate's use, and what to do about it
+
+
+def verdict(nis_per_dof: float, *, white: bool, refused: float = 0.0) -> str:
+    """A sensor in words: whether something must be done, and how large its errors are beside what the filter expects.
+
+    refused: the share of its values, in flight, that lay outside the gate.
+    """
+    larger = nis_per_dof > MODEST_SQUARES[1]
+    said = [f"{np.sqrt(nis_per_dof):.1f} times the scatter that the filter expects"] if larger else []
+    said += [f"{100.0 * refused:.0f} % of it refused in flight"] if refused > MANY_REFUSED else []
+    if said:
+        return f"{ACT}: {', '.join(said)}"
+    said = ["less scatter than the filter expects"] if nis_per_dof < MODEST_SQUARES[0] else []
+    said += [] if white else ["its errors last"]
+    return f"{HARMLESS}: {', '.join(said)}" if said else GOOD
+
+
+def meanings(verdicts: Iterable[str]) -> list[str]:
+    """What the verdicts at hand mean for use and what to do, a sentence for each that occurs."""
+    found = list(verdicts)
+    return [f"{word}: {meaning}" for word, meaning in MEANING.items() if any(said.startswith(word) for said in found)]

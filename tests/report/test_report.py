@@ -83,7 +83,7 @@ def outdoor() -> Page:
 
 
 def test_the_headline_says_what_flew_and_how_well(landing: Page) -> None:
-    for words in ("Landing", "Filter paper", "GPS model white", "Seed 1", "Length 50.0 s"):
+    for words in ("Landing", "the filter paper", "a GPS of the model white", "seed 1", "flight of 50.0"):
         assert words in landing.text
     assert "Largest error of one axis" in landing.text
     assert "paper 0.272 m" in landing.text

@@ -23,6 +23,7 @@ from flownav.report import (
 )
 from flownav.report.chart import DOT_POINTS, LINE_POINTS
 from flownav.report.figures_states import Paths, paths_of
+from flownav.report.headline import flown_with, headline
 from flownav.report.landing import landing_picture
 from flownav.report.page_data import Columns, paths_data, sections_data
 from flownav.report.panels import Panel, Section
@@ -34,7 +35,7 @@ from flownav.scoring.phases import Phase, phases_of
 
 HERE = Path(__file__).parent
 PLOTLY = "plotly.min.js"
-RECORD_STYLES = ("vendor/uPlot.min.css", "page.css", "record.css")
+RECORD_STYLES = ("vendor/uPlot.min.css", "page.css", "record.css", "landing.css")
 RECORD_SCRIPTS = (
     "vendor/uPlot.iife.min.js",
     "record_data.js",
@@ -110,7 +111,8 @@ def render(record: Record) -> str:
         kind=str(record.manifest.get("kind") or "flight"),
         description=str(record.manifest.get("description") or ""),
         has_truth=has(record, "truth"),
-        facts=content.facts(record),
+        headline=headline(record),
+        flown_with=flown_with(record),
         summary=content.summary(record),
         landing=picture and Markup(picture.svg),
         landing_words=picture.words if picture else "",

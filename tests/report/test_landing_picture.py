@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from tests.helpers.report_records import flight, navigated, replay
 
+from flownav.report import series
 from flownav.report.headline import flown_with, headline
 from flownav.report.html import render
 from flownav.report.landing import landing_picture
 from flownav.report.landing_scene import FRAMES
+from flownav.report.path_picture import path_picture
 from flownav.report.sureness import three_sigma
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -134,7 +136,7 @@ def test_the_page_begins_with_it_and_does_without_where_nothing_landed():
     page = render(landed())
     assert page.index('class="landing"') < page.index('class="tiles"')
     assert landing_picture(flight("takeoff")) is None
-    assert 'class="landing"' not in render(flight("takeoff"))
+    assert "The path from above" in render(flight("takeoff"))
     for contact in ({}, {"t_s": 20.0, "distance_m": float("nan")}, {"t_s": 20.0, "distance_m": "far"}):
         record = landed()
         record.manifest["scores"]["touchdown"]["contact"] = contact
@@ -166,7 +168,7 @@ def test_the_first_lines_say_whether_it_landed_where_how_sure_and_what_limited_i
     said = headline(record)
     assert "landed 0.370 m from the pad's centre" in said
     assert "within 0.090 m" in said  # three sigma of the less certain axis, east
-    assert "Most of the distance comes from guidance (0.340 m)" in said
+    assert "The largest part of that distance is due to guidance (0.340 m)" in said
     assert said in render(record).replace("&#39;", "'")
     assert headline(landed(scores={"touchdown": {"reason": "no pad in sight"}})) == "It did not land: no pad in sight."
     touchdown["broken"] = ["sinking at 2 m/s"]
@@ -175,3 +177,24 @@ def test_the_first_lines_say_whether_it_landed_where_how_sure_and_what_limited_i
     assert "Filter landing" not in render(record)
     assert "Simulated" in flown_with(record)
     assert "seed" in flown_with(record)
+
+
+def test_a_log_has_its_path_with_the_cut_of_gps_and_its_height_by_phase():
+    record = replay()
+    path, height = (view.find(f"{SVG}g") for view in ElementTree.fromstring(path_picture(record).svg))
+    lines = {one.get("class"): floats(one.get("points")).reshape(-1, 2) for one in path.iter(f"{SVG}polyline")}
+    assert {"way of-estimate", "way of-gps", "cut"} <= set(lines)
+    estimate, cut = record.tables["estimate"], series.outages(record)[0]
+    inside = (np.asarray(estimate["t_s"]) >= cut[0]) & (np.asarray(estimate["t_s"]) <= cut[1])
+    whole, part = lines["way of-estimate"], lines["cut"]
+    share = np.ptp(part[:, 0]) / np.ptp(whole[:, 0])
+    assert share == pytest.approx(np.ptp(estimate["pos_e_m"][inside]) / np.ptp(estimate["pos_e_m"]), abs=0.1)
+    drawn = next(one for one in height.iter(f"{SVG}polyline") if one.get("class") == "way of-estimate")
+    y, height_m = floats(drawn.get("points")).reshape(-1, 2)[:, 1], -np.asarray(estimate["pos_d_m"])
+    assert (y.argmin() / len(y)) == pytest.approx(height_m.argmax() / len(height_m), abs=0.02)
+    assert any(one.get("class") == "band" for one in height.iter(f"{SVG}rect"))
+    assert render(record).index("The path from above") < render(record).index('class="tiles"')
+    assert "GPS withheld" in "".join(path.itertext())
+    for name in ("estimate", "gps_position", "autopilot", "truth", "smoothed"):
+        record.tables.pop(name, None)
+    assert path_picture(record) is None

@@ -33,7 +33,7 @@ def headline(record: Record) -> str:
     known = {words: float(size) for words, size in limits.items() if _is_number(size)}
     if place and known:
         most = max(known, key=lambda words: known[words])
-        said.append(f"Most of the distance comes from {most} ({metres(known[most])} m).")
+        said.append(f"The largest part of that distance is due to {most} ({metres(known[most])} m).")
     return " ".join(said)
 
 

@@ -27,6 +27,7 @@ from flownav.report.headline import flown_with, headline
 from flownav.report.landing import landing_picture
 from flownav.report.page_data import Columns, paths_data, sections_data
 from flownav.report.panels import Panel, Section
+from flownav.report.path_picture import path_picture
 from flownav.report.series import Window, first_pad_fix_s, has, moments, outages, start_end_s
 from flownav.report.spectrum import spectrum
 from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE, Drawing
@@ -105,7 +106,8 @@ def render(record: Record) -> str:
     shown = sections(record)
     from markupsafe import Markup
 
-    found, judged, picture = phases_of(record), tables.sensor_rows(record), landing_picture(record)
+    found, judged = phases_of(record), tables.sensor_rows(record)
+    picture = landing_picture(record) or path_picture(record)
     page: str = template("page.html.j2").render(
         title=content.title(record),
         kind=str(record.manifest.get("kind") or "flight"),

@@ -98,7 +98,7 @@ def _side(s: Scene) -> str:
     ]
     compass = f"nose to the right, heading {np.degrees(s.along) % 360.0:.0f}\N{DEGREE SIGN}"
     parts = [ticks, pad, _ways(s, at, radii), *moving, _phase_key(s)]
-    return _view(0, SIDE_PX, f"From the side, {compass}", "".join(parts))
+    return view(0, SIDE_PX, f"From the side, {compass}", "".join(parts))
 
 
 def _above(s: Scene) -> str:
@@ -118,11 +118,11 @@ def _above(s: Scene) -> str:
     north = '<path class="arrow" d="M14 62V38m-4 7 4-7 4 7"/><text x="14" y="76" text-anchor="middle">N</text>'
     wind = "" if s.wind is None else _wind_arrow(s.wind)
     title = "From above" + (f", the pad is {s.pad_m:g} m square" if s.pad_m else "")
-    return _view(
+    return view(
         1,
         ABOVE_PX,
         title,
-        "".join([pad, _ways(s, at, scale * s.three_sigma_m[:, 1::-1]), *moving, cross, north, wind, _bar(scale)]),
+        "".join([pad, _ways(s, at, scale * s.three_sigma_m[:, 1::-1]), *moving, cross, north, wind, scale_bar(scale)]),
     )
 
 
@@ -151,12 +151,13 @@ def _close(s: Scene) -> str:
     tube = _tube(ends[1], scale * s.three_sigma_m[late, 1::-1])
     away = float(np.hypot(*s.touch_m))
     title = f"Touchdown, {metres(away)} m off the centre"
-    parts = [tube, centre, dots, _lines(*ends), *moving, ring, cross, _bar(scale), _key(s, bool(tube))]
-    return _view(2, CLOSE_PX, title, "".join(parts))
+    parts = [tube, centre, dots, _lines(*ends), *moving, ring, cross, scale_bar(scale), _key(s, bool(tube))]
+    return view(2, CLOSE_PX, title, "".join(parts))
 
 
 # -- what they are made of -----------------------------------------------------------------------------------------
-def _view(number: int, wide: float, title: str, inside: str) -> str:
+def view(number: int, wide: float, title: str, inside: str) -> str:
+    """A view under its title; number: which of its picture, wide [px]."""
     clip = f'<clipPath id="landing-{number}"><rect y="22" width="{wide}" height="{HIGH_PX - 22}" rx="6"/></clipPath>'
     head = f'<text class="title" x="0" y="13">{escape(title)}</text>'
     return f'{clip}{head}<g clip-path="url(#landing-{number})">{inside}</g>'
@@ -195,8 +196,12 @@ def _phase_key(s: Scene) -> str:
 
 
 def _lines(truth: Array, said: Array) -> str:
-    drawn = (("truth", truth), ("flown", said))
-    return "".join(f'<polyline class="way {role}" points="{_points(way)}"/>' for role, way in drawn)
+    return polyline("way truth", truth) + polyline("way flown", said)
+
+
+def polyline(role: str, way: Array) -> str:
+    """A line through places (n, 2) [px], those that are numbers."""
+    return f'<polyline class="{role}" points="{_points(way)}"/>'
 
 
 def _points(way: Array) -> str:
@@ -209,16 +214,17 @@ def _moved(shape: str, role: str, s: Scene, way: Array, degrees: Array | None) -
     x, y = way[still]
     turn = "" if degrees is None else f" rotate({degrees[still]:.1f})"
     turning = (
-        "" if degrees is None else _animated("rotate", [f"{angle:.1f}" for angle in np.unwrap(degrees, period=360)])
+        "" if degrees is None else animated("rotate", [f"{angle:.1f}" for angle in np.unwrap(degrees, period=360)])
     )
-    going = _animated("translate", [f"{a:.1f} {b:.1f}" for a, b in way])
+    going = animated("translate", [f"{a:.1f} {b:.1f}" for a, b in way])
     return (
         f'<g class="still {role}" transform="translate({x:.1f} {y:.1f}){turn}">{shape}</g>'
         f'<g class="moving {role}">{going}<g>{turning}{shape}</g></g>'
     )
 
 
-def _animated(kind: str, values: Sequence[str]) -> str:
+def animated(kind: str, values: Sequence[str]) -> str:
+    """A motion ("translate" or "rotate") through values in the loop."""
     return (
         f'<animateTransform attributeName="transform" type="{kind}" dur="{LOOP_S:g}s" repeatCount="indefinite" '
         f'values="{";".join(values)}"/>'
@@ -239,9 +245,9 @@ def _wind_arrow(wind: tuple[float, float]) -> str:
     )
 
 
-def _bar(scale: float) -> str:
-    """A bar of a round length."""
-    length = max((size for size in ROUND_M if scale * size <= 110.0), default=ROUND_M[0])
+def scale_bar(scale: float, lengths_m: Sequence[float] = ROUND_M) -> str:
+    """A bar of a round length, scale in px/m."""
+    length = max((size for size in lengths_m if scale * size <= 110.0), default=lengths_m[0])
     said = f"{100 * length:g} cm" if length < 1.0 else f"{length:g} m"
     right = f"M8 {HIGH_PX - 10}v4h{scale * length:.1f}v-4"
     return f'<path class="arrow" d="{right}"/><text x="{12}" y="{HIGH_PX - 11}">{said}</text>'

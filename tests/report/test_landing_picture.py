@@ -10,6 +10,8 @@ import pytest
 from tests.helpers.report_records import flight, navigated, replay
 
 from flownav.report import series
+from flownav.report.campaign_figures import Touchdowns
+from flownav.report.cloud_picture import cloud_picture
 from flownav.report.headline import flown_with, headline
 from flownav.report.html import render
 from flownav.report.landing import landing_picture
@@ -198,3 +200,24 @@ def test_a_log_has_its_path_with_the_cut_of_gps_and_its_height_by_phase():
     for name in ("estimate", "gps_position", "autopilot", "truth", "smoothed"):
         record.tables.pop(name, None)
     assert path_picture(record) is None
+
+
+def test_a_campaigns_picture_has_every_touchdown_and_its_rings_to_scale():
+    north, east = np.array([0.1, -0.2, np.inf]), np.array([0.0, 0.3, np.inf])
+    touched = Touchdowns(north, east, np.hypot(north, east), 2.0)
+    cell = {
+        "label": "landing",
+        "figures": {"r50_m": {"value": 0.1}, "r95_m": {"value": 0.4}, "r997_m": {"value": None}},
+    }
+    pad, near = (view.find(f"{SVG}g") for view in ElementTree.fromstring(cloud_picture(cell, touched).svg))
+    square = next(one for one in pad.iter(f"{SVG}rect") if one.get("class") == "pad")
+    scale = float(square.get("width")) / 2.0
+    rings = [float(one.get("r")) for one in pad.iter(f"{SVG}circle") if one.get("class") == "ring"]
+    assert rings == pytest.approx([0.1 * scale, 0.4 * scale], abs=0.1)
+    dots = [one for one in near.iter(f"{SVG}circle") if one.get("class") == "other"]
+    ring = [float(one.get("r")) for one in near.iter(f"{SVG}circle") if one.get("class") == "ring"][1]
+    apart = float(dots[1].get("cx")) - float(dots[0].get("cx")), float(dots[0].get("cy")) - float(dots[1].get("cy"))
+    assert np.array(apart) * 0.4 / ring == pytest.approx([0.3, -0.3], abs=0.002)
+    assert len(dots) == 2
+    assert "R95 0.400 m" in "".join(near.itertext())
+    assert cloud_picture(cell, Touchdowns(north[2:], east[2:], north[2:], 2.0)) is None

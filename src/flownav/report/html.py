@@ -36,7 +36,8 @@ from flownav.scoring.phases import Phase, phases_of
 
 HERE = Path(__file__).parent
 PLOTLY = "plotly.min.js"
-RECORD_STYLES = ("vendor/uPlot.min.css", "page.css", "record.css", "landing.css")
+PICTURE_STYLES = ("picture.css", "landing.css")  # of the picture on top of a page
+RECORD_STYLES = ("vendor/uPlot.min.css", "page.css", "record.css", *PICTURE_STYLES)
 RECORD_SCRIPTS = (
     "vendor/uPlot.iife.min.js",
     "record_data.js",
@@ -205,7 +206,7 @@ def drawn_with(shown: Sequence[Section]) -> dict[str, Any]:
         "font": Markup(FONT),
         "data": {one.key: Markup(figure_json(one)) for section in shown for one in section.panels if one.drawn},
         "dark": Markup(inside_script(json.dumps(LIGHT_TO_DARK))),
-        "style": Markup((HERE / "page.css").read_text(encoding="utf-8")),
+        "style": Markup("\n".join((HERE / name).read_text(encoding="utf-8") for name in ("page.css", *PICTURE_STYLES))),
         "scripts": [Markup(script) for script in scripts],
         "policy": content_policy(scripts),
     }

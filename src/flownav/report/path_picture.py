@@ -15,7 +15,7 @@ from flownav.report.landing import HIGH_PX, ROUND_M, Picture, animated, polyline
 from flownav.report.series import Track, Window, at, start_end_s
 from flownav.scoring.phases import Phase, phases_of
 
-MAP_PX, HEIGHT_PX = 460, 600
+MAP_PX, HEIGHT_PX = 440, 520
 MARGIN_PX = 24.0
 MAP_POINTS, HEIGHT_POINTS, FRAMES = 500, 300, 72
 LEAST_M = 2.0  # the smallest ground that is shown

@@ -1,6 +1,7 @@
 """Write a record's report: one HTML file that needs nothing but a browser."""
 
 import base64
+import gzip
 import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -199,7 +200,7 @@ def drawn_with(shown: Sequence[Section]) -> dict[str, Any]:
     """What every page with figures is given: its sections, their data, colours, style, scripts and content policy."""
     from markupsafe import Markup
 
-    scripts = [plotly_script(), (HERE / "page.js").read_text(encoding="utf-8")]
+    plotly, own = plotly_script(), (HERE / "page.js").read_text(encoding="utf-8")
     return {
         "sections": shown,
         "palette": PALETTE,
@@ -207,8 +208,9 @@ def drawn_with(shown: Sequence[Section]) -> dict[str, Any]:
         "data": {one.key: Markup(figure_json(one)) for section in shown for one in section.panels if one.drawn},
         "dark": Markup(inside_script(json.dumps(LIGHT_TO_DARK))),
         "style": Markup("\n".join((HERE / name).read_text(encoding="utf-8") for name in ("page.css", *PICTURE_STYLES))),
-        "scripts": [Markup(script) for script in scripts],
-        "policy": content_policy(scripts),
+        "plotly": Markup(base64.b64encode(gzip.compress(plotly.encode(), 9, mtime=0)).decode()),
+        "scripts": [Markup(own)],
+        "policy": content_policy([plotly, own]),
     }
 
 

@@ -115,14 +115,19 @@ def test_sensors_are_judged_in_words_and_the_drift_at_the_end_is_told() -> None:
         "coverage": {"range": {"t0": 1.0, "t1": 31.25}, "imu": {"t0": 0.0, "t1": 60.0}},
         "consistency": {"range": {"nis_per_dof": 2.5, "samples": 1234, "white": False}},
     }
+    record.tables.pop("imu", None)
+    at_4_hz = np.arange(121) * 0.25
+    record.tables["range"] = {"t_s": at_4_hz[(at_4_hz <= 10) | (at_4_hz >= 12.25)], "range_m": np.ones(113)}
     said = "larger than stated, each like the last"
     assert sensor_rows(record) == [
-        ("Rangefinder", "1.0 to 31.2", "1,234", "2.50", said),
-        ("IMU", "0.0 to 60.0", NONE, NONE, ""),
+        ("Rangefinder", "1.0 to 31.2", "3.7", "2.25", "1,234", "2.50", said),
+        ("IMU", "0.0 to 60.0", NONE, NONE, NONE, NONE, ""),
     ]
     page = render(record)
     assert "larger than stated: the sensor is trusted too much" in page
     assert "0.417" in page
+    for told in ("--to ulog</code> for PlotJuggler", "--to foxglove</code> for Foxglove", "flownav view RECORD.fnr"):
+        assert told in page
     assert sensor_rows(Record()) == []
 
 

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from flownav.core.record import Record, mapping
 from flownav.report import series
 from flownav.report.figures_innovation import SENSOR_TITLES
@@ -185,8 +187,9 @@ def rejected_rows(record: Record, phases: Sequence[Phase] = ()) -> list[tuple[st
     ]  # fmt: skip
 
 
-def sensor_rows(record: Record) -> list[tuple[str, str, str, str, str]]:
-    """Sensors as (name, from and to in seconds, innovations tested, their mean square per component, verdict)."""
+def sensor_rows(record: Record) -> list[tuple[str, ...]]:
+    """Sensors as (name, from and to [s], rate [Hz], longest gap [s], innovations tested, their mean square per
+    component, verdict)."""
     scores = mapping(record.manifest.get("scores"))
     spans, judged = mapping(scores.get("coverage")), mapping(scores.get("consistency"))
     rows = []
@@ -197,5 +200,14 @@ def sensor_rows(record: Record) -> list[tuple[str, str, str, str, str]]:
         if found:
             mean, tested = number(found.get("nis_per_dof"), 2), f"{found.get('samples') or 0:,}"
             said = verdict(float(found.get("nis_per_dof") or 0.0), white=bool(found.get("white")))
-        rows.append((SENSOR_TITLES.get(name, name.replace("_", " ")), span_s, tested, mean, said))
+        rows.append((SENSOR_TITLES.get(name, name.replace("_", " ")), span_s, *_pace(record, name), tested, mean, said))
     return rows
+
+
+def _pace(record: Record, name: str) -> tuple[str, str]:
+    """A sensor's mean rate [Hz] and its longest gap [s] between readings; dashes where the record lacks them."""
+    t_s = np.sort(np.asarray(record.tables.get(name, {}).get("t_s", ()), float))
+    t_s = t_s[np.isfinite(t_s)]
+    if len(t_s) < 2 or t_s[-1] <= t_s[0]:
+        return NONE, NONE
+    return number((len(t_s) - 1) / float(t_s[-1] - t_s[0]), 1), number(float(np.max(np.diff(t_s))), 2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import json
 import subprocess
 import sys
@@ -89,6 +90,12 @@ assert "Plotly.newPlot" in page and "A &lt;/title&gt;" in page and len(page) > 1
 assert "plotly" not in sys.modules, "loaded"
 """
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_page_with_plotlys_script_is_small_enough_to_send():
+    given = html.drawn_with([])
+    assert gzip.decompress(base64.b64decode(given["plotly"])).decode() == html.plotly_script()
+    assert len(given["plotly"]) + len(given["style"]) + sum(map(len, given["scripts"])) <= 2.1e6
 
 
 def test_without_plotly_one_line_says_what_to_install(monkeypatch, tmp_path):

@@ -7,10 +7,17 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from tests.helpers.report_records import flight, navigated
+from tests.helpers.report_records import flight, navigated, replay
 
+from flownav.report import series
+from flownav.report.campaign_figures import Touchdowns
+from flownav.report.cloud_picture import cloud_picture
+from flownav.report.headline import flown_with, headline
 from flownav.report.html import render
-from flownav.report.landing import FRAMES, landing_picture
+from flownav.report.landing import landing_picture
+from flownav.report.landing_scene import FRAMES
+from flownav.report.path_picture import path_picture
+from flownav.report.sureness import three_sigma
 
 SVG = "{http://www.w3.org/2000/svg}"
 JOKER = {"main_rotor.radius_m": {"value": 0.89}, "main_rotor.hub_above_cg_m": 0.25, "tail_rotor.behind_cg_m": 1.065,
@@ -32,7 +39,7 @@ def landed(**more):
 
 def views(record, **options):
     root = ElementTree.fromstring(landing_picture(record, **options).svg)
-    return root.findall(f"{SVG}g")
+    return root.findall(f"{SVG}g") or [view.find(f"{SVG}g") for view in root.findall(f"{SVG}svg")]
 
 
 def floats(text):
@@ -70,6 +77,51 @@ def test_the_loop_is_the_records_own_path():
     assert moved == pytest.approx([expected[0], -expected[1]], abs=0.02)
 
 
+def test_the_tube_is_three_sigma_of_what_the_filter_states():
+    record = landed()
+    estimate = record.tables["estimate"]
+    estimate |= {f"std_pos_{axis}_m": np.full(len(estimate["t_s"]), 0.01 * k) for k, axis in enumerate("ned", 2)}
+    _, above, _ = views(record)
+    scale = float(next(one for one in above.iter(f"{SVG}rect") if one.get("class") == "pad").get("width")) / 3.0
+    ellipses = list(above.iter(f"{SVG}ellipse"))
+    tube = next(one for one in above.iter(f"{SVG}g") if one.get("class") == "tube")
+    assert len(list(tube)) > 20
+    first = next(iter(tube))
+    assert float(first.get("rx")) == pytest.approx(3.0 * 0.03 * scale, abs=0.06)  # east is to the right
+    assert float(first.get("ry")) == pytest.approx(3.0 * 0.02 * scale, abs=0.06)
+    assert first in ellipses
+    estimate["std_pos_n_m"] = np.full(len(estimate["t_s"]), np.nan)
+    assert not [one for view in views(record) for one in view.iter(f"{SVG}g") if one.get("class") == "tube"]
+
+
+def test_pad_fixes_say_how_sure_it_is_against_the_pad():
+    record, fix_s = landed(), np.arange(10.0, 20.0, 0.1)
+    names = ("tan_forward", "tan_right", "distance_m")
+    count = len(fix_s)
+    record.tables["pad"] = {
+        "t_s": fix_s, **dict.fromkeys(names[:2], np.zeros(count)),
+        "distance_m": np.full(count, 2.0), "quality": np.full(count, 255.0),
+    }  # fmt: skip
+    inner = {"forward": 3e-4 + 1e-4, "right": 3e-4 + 1e-4, "distance_m": 3e-4 + 9e-4}
+    record.tables["innovation"] = {
+        "t_s": np.repeat(fix_s, 3), "sensor": np.array(["pad"] * 3 * count), "component": np.array(names * count),
+        "observation": np.zeros(3 * count), "innovation": np.zeros(3 * count), "test_ratio": np.zeros(3 * count),
+        "observation_variance": np.full(3 * count, 3e-4), "innovation_variance": np.tile(list(inner.values()), count),
+        "fused": np.ones(3 * count), "reason": np.array([""] * 3 * count),
+    }  # fmt: skip
+    near, far = three_sigma(record, np.array([15.0, 25.0]))
+    assert near == pytest.approx([3 * 0.02, 3 * 0.02, 3 * 0.03])  # 0.01 m per metre of distance, at 2 m
+    assert np.isnan(far).all()
+
+
+def test_the_phases_colour_the_path():
+    side = views(landed())[0]
+    coloured = [one.get("style") for one in side.iter(f"{SVG}polyline") if one.get("class") == "phase-way"]
+    named = [text.text for text in side.iter(f"{SVG}text")]
+    assert coloured
+    assert all(re.search(r"phase-(\w+)", style)[1] in named for style in coloured)
+
+
 def test_many_flights_give_the_ring_and_their_dots():
     assert not [one for view in views(landed()) for one in view.iter() if one.get("class") == "ring"]
     many = {"flights": 48, "r95_m": 0.5, "north_m": [0.1, 0.2, -0.3], "east_m": [0.0, 0.1, 0.2]}
@@ -86,7 +138,7 @@ def test_the_page_begins_with_it_and_does_without_where_nothing_landed():
     page = render(landed())
     assert page.index('class="landing"') < page.index('class="tiles"')
     assert landing_picture(flight("takeoff")) is None
-    assert 'class="landing"' not in render(flight("takeoff"))
+    assert "The path from above" in render(flight("takeoff"))
     for contact in ({}, {"t_s": 20.0, "distance_m": float("nan")}, {"t_s": 20.0, "distance_m": "far"}):
         record = landed()
         record.manifest["scores"]["touchdown"]["contact"] = contact
@@ -107,3 +159,65 @@ def test_alone_it_brings_its_colours_and_its_quadrotor():
     _, above, _ = views(record, alone=True)
     still = next(one for one in above.iter(f"{SVG}g") if one.get("class") == "still vehicle")
     assert len(still.findall(f"{SVG}circle")) == 4
+
+
+def test_the_first_lines_say_whether_it_landed_where_how_sure_and_what_limited_it():
+    record = landed()
+    estimate = record.tables["estimate"]
+    estimate |= {f"std_pos_{axis}_m": np.full(len(estimate["t_s"]), 0.01 * k) for k, axis in enumerate("ned", 2)}
+    touchdown = record.manifest["scores"]["touchdown"]
+    touchdown |= {"limited_by": {"estimate_m": 0.1, "guidance_m": 0.34, "pad_m": 0.0}}
+    said = headline(record)
+    assert "landed 0.370 m from the pad's centre" in said
+    assert "within 0.090 m" in said  # three sigma of the less certain axis, east
+    assert "The largest part of that distance is due to guidance (0.340 m)" in said
+    assert said in render(record).replace("&#39;", "'")
+    assert headline(landed(scores={"touchdown": {"reason": "no pad in sight"}})) == "It did not land: no pad in sight."
+    touchdown["broken"] = ["sinking at 2 m/s"]
+    assert headline(record).startswith("It crashed 0.370 m from the pad's centre: sinking at 2 m/s.")
+    assert headline(replay()) == ""
+    assert "Filter landing" not in render(record)
+    assert "Simulated" in flown_with(record)
+    assert "seed" in flown_with(record)
+
+
+def test_a_log_has_its_path_with_the_cut_of_gps_and_its_height_by_phase():
+    record = replay()
+    path, height = (view.find(f"{SVG}g") for view in ElementTree.fromstring(path_picture(record).svg))
+    lines = {one.get("class"): floats(one.get("points")).reshape(-1, 2) for one in path.iter(f"{SVG}polyline")}
+    assert {"way of-estimate", "way of-gps", "cut"} <= set(lines)
+    estimate, cut = record.tables["estimate"], series.outages(record)[0]
+    inside = (np.asarray(estimate["t_s"]) >= cut[0]) & (np.asarray(estimate["t_s"]) <= cut[1])
+    whole, part = lines["way of-estimate"], lines["cut"]
+    share = np.ptp(part[:, 0]) / np.ptp(whole[:, 0])
+    assert share == pytest.approx(np.ptp(estimate["pos_e_m"][inside]) / np.ptp(estimate["pos_e_m"]), abs=0.1)
+    drawn = next(one for one in height.iter(f"{SVG}polyline") if one.get("class") == "way of-estimate")
+    y, height_m = floats(drawn.get("points")).reshape(-1, 2)[:, 1], -np.asarray(estimate["pos_d_m"])
+    assert (y.argmin() / len(y)) == pytest.approx(height_m.argmax() / len(height_m), abs=0.02)
+    assert any(one.get("class") == "band" for one in height.iter(f"{SVG}rect"))
+    assert render(record).index("The path from above") < render(record).index('class="tiles"')
+    assert "GPS withheld" in "".join(path.itertext())
+    for name in ("estimate", "gps_position", "autopilot", "truth", "smoothed"):
+        record.tables.pop(name, None)
+    assert path_picture(record) is None
+
+
+def test_a_campaigns_picture_has_every_touchdown_and_its_rings_to_scale():
+    north, east = np.array([0.1, -0.2, np.inf]), np.array([0.0, 0.3, np.inf])
+    touched = Touchdowns(north, east, np.hypot(north, east), 2.0)
+    cell = {
+        "label": "landing",
+        "figures": {"r50_m": {"value": 0.1}, "r95_m": {"value": 0.4}, "r997_m": {"value": None}},
+    }
+    pad, near = (view.find(f"{SVG}g") for view in ElementTree.fromstring(cloud_picture(cell, touched).svg))
+    square = next(one for one in pad.iter(f"{SVG}rect") if one.get("class") == "pad")
+    scale = float(square.get("width")) / 2.0
+    rings = [float(one.get("r")) for one in pad.iter(f"{SVG}circle") if one.get("class") == "ring"]
+    assert rings == pytest.approx([0.1 * scale, 0.4 * scale], abs=0.1)
+    dots = [one for one in near.iter(f"{SVG}circle") if one.get("class") == "other"]
+    ring = [float(one.get("r")) for one in near.iter(f"{SVG}circle") if one.get("class") == "ring"][1]
+    apart = float(dots[1].get("cx")) - float(dots[0].get("cx")), float(dots[0].get("cy")) - float(dots[1].get("cy"))
+    assert np.array(apart) * 0.4 / ring == pytest.approx([0.3, -0.3], abs=0.002)
+    assert len(dots) == 2
+    assert "R95 0.400 m" in "".join(near.itertext())
+    assert cloud_picture(cell, Touchdowns(north[2:], east[2:], north[2:], 2.0)) is None

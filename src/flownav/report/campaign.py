@@ -11,6 +11,7 @@ from flownav.core.version import __version__
 from flownav.report import campaign_figures as figures
 from flownav.report import certificate_figures, tables
 from flownav.report.campaign_figures import Touchdowns
+from flownav.report.cloud_picture import cloud_picture
 from flownav.report.html import HERE, drawn_with, page_of, template, widened
 from flownav.report.panels import NONE, Panel, Section, number
 
@@ -37,8 +38,13 @@ def write_campaign(summary: dict[str, Any], touchdowns: Sequence[Touchdowns], ke
 
 def render(summary: dict[str, Any], touchdowns: Sequence[Touchdowns], kept: Sequence[str] = ()) -> str:
     """The page as text."""
+    from markupsafe import Markup
+
     shown = sections(summary, touchdowns)
+    picture = cloud_picture(summary["cells"][0], touchdowns[0]) if touchdowns else None
     page: str = template("campaign.html.j2").render(
+        picture=picture and Markup(picture.svg),
+        picture_words=picture.words if picture else "",
         title=", ".join(summary["scenarios"]),
         facts=facts(summary),
         sentence=sentence(summary["cells"][0]),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flownav.core.measurement import Array
 from flownav.report.series import Moment, Window
 
-LINE_POINTS = 3000  # a drawn line has at most so many points
+LINE_POINTS = 2700  # a drawn line has at most so many points
 DOT_POINTS = 900  # a cloud of readings so many dots
 CROSS_POINTS = 250  # and the exceptional ones so many crosses
 

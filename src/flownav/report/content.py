@@ -38,16 +38,6 @@ def duration_s(record: Record) -> float:
     return float(stated) if isinstance(stated, (int, float)) else end - start
 
 
-def facts(record: Record) -> list[tuple[str, str]]:
-    """The line under the heading: filter, GPS model, plant, seed, length."""
-    manifest = record.manifest
-    named = {"Filter": "filter", "GPS model": "gps", "Plant": "truth", "Truth": "truth_model",
-             "Feedback": "feedback", "Seed": "seed",
-             "Flight": "flight"}  # fmt: skip
-    shown = [(name, str(manifest[key])) for name, key in named.items() if manifest.get(key) is not None]
-    return [*shown, ("Length", f"{duration_s(record):.1f} s")]
-
-
 def summary(record: Record) -> str:
     """The verdict in sentences."""
     manifest, scores = record.manifest, mapping(record.manifest.get("scores"))

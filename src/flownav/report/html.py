@@ -1,6 +1,7 @@
 """Write a record's report: one HTML file that needs nothing but a browser."""
 
 import base64
+import gzip
 import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,9 +24,11 @@ from flownav.report import (
 )
 from flownav.report.chart import DOT_POINTS, LINE_POINTS
 from flownav.report.figures_states import Paths, paths_of
+from flownav.report.headline import flown_with, headline
 from flownav.report.landing import landing_picture
 from flownav.report.page_data import Columns, paths_data, sections_data
 from flownav.report.panels import Panel, Section
+from flownav.report.path_picture import path_picture
 from flownav.report.series import Window, first_pad_fix_s, has, moments, outages, start_end_s
 from flownav.report.spectrum import spectrum
 from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE, Drawing
@@ -34,7 +37,8 @@ from flownav.scoring.sensor_verdict import meanings
 
 HERE = Path(__file__).parent
 PLOTLY = "plotly.min.js"
-RECORD_STYLES = ("vendor/uPlot.min.css", "page.css", "record.css")
+PICTURE_STYLES = ("picture.css", "landing.css")  # of the picture on top of a page
+RECORD_STYLES = ("vendor/uPlot.min.css", "page.css", "record.css", *PICTURE_STYLES)
 RECORD_SCRIPTS = (
     "vendor/uPlot.iife.min.js",
     "record_data.js",
@@ -104,13 +108,15 @@ def render(record: Record) -> str:
     shown = sections(record)
     from markupsafe import Markup
 
-    found, judged, picture = phases_of(record), tables.sensor_rows(record), landing_picture(record)
+    found, judged = phases_of(record), tables.sensor_rows(record)
+    picture = landing_picture(record) or path_picture(record)
     page: str = template("page.html.j2").render(
         title=content.title(record),
         kind=str(record.manifest.get("kind") or "flight"),
         description=str(record.manifest.get("description") or ""),
         has_truth=has(record, "truth"),
-        facts=content.facts(record),
+        headline=headline(record),
+        flown_with=flown_with(record),
         summary=content.summary(record),
         landing=picture and Markup(picture.svg),
         landing_words=picture.words if picture else "",
@@ -194,16 +200,17 @@ def drawn_with(shown: Sequence[Section]) -> dict[str, Any]:
     """What every page with figures is given: its sections, their data, colours, style, scripts and content policy."""
     from markupsafe import Markup
 
-    scripts = [plotly_script(), (HERE / "page.js").read_text(encoding="utf-8")]
+    plotly, own = plotly_script(), (HERE / "page.js").read_text(encoding="utf-8")
     return {
         "sections": shown,
         "palette": PALETTE,
         "font": Markup(FONT),
         "data": {one.key: Markup(figure_json(one)) for section in shown for one in section.panels if one.drawn},
         "dark": Markup(inside_script(json.dumps(LIGHT_TO_DARK))),
-        "style": Markup((HERE / "page.css").read_text(encoding="utf-8")),
-        "scripts": [Markup(script) for script in scripts],
-        "policy": content_policy(scripts),
+        "style": Markup("\n".join((HERE / name).read_text(encoding="utf-8") for name in ("page.css", *PICTURE_STYLES))),
+        "plotly": Markup(base64.b64encode(gzip.compress(plotly.encode(), 9, mtime=0)).decode()),
+        "scripts": [Markup(own)],
+        "policy": content_policy([plotly, own]),
     }
 
 

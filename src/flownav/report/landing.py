@@ -1,33 +1,31 @@
-"""The picture of a landing: from the side and from above, the vehicle to scale, and the touchdown close up, as one SVG.
+"""The picture of a landing: from the side and from above, the vehicle to scale, and the touchdown close up, in SVG.
 
 What moves is moved by the SVG itself (SMIL) in a loop of 5 s, so that the picture needs no script and stands alone in a
 README as well as in a page; where little motion is asked for, and on paper, it shows the instant of the touchdown.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from html import escape
-from math import isfinite
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from flownav.core.frames import rotation_from_quaternion
 from flownav.core.measurement import Array
-from flownav.core.record import POSITION_NED, QUATERNION, Record, mapping
+from flownav.core.record import Record
+from flownav.report.landing_scene import Course, Scene, scene_of
 from flownav.report.panels import metres
-from flownav.report.series import has
 from flownav.report.style import FONT, PALETTE
-from flownav.report.vehicle_shape import Shape, shape_of
 
-LOOP_S, CLOSE_S, AFTER_S = 5.0, 3.0, 1.5
-FROM_M, SHOWN_S = 2.0, (8.0, 40.0)  # the picture begins where the skids were last so high; so long it lasts
-FRAMES, WAY_POINTS, DOTS = 72, 400, 400  # that a thing moves through, of a drawn path, of other flights
+LOOP_S, CLOSE_S = 5.0, 3.0
 HIGH_PX, SIDE_PX, ABOVE_PX, CLOSE_PX, GAP_PX = 360, 380, 360, 300, 20
-WIDE_PX = SIDE_PX + ABOVE_PX + CLOSE_PX + 2 * GAP_PX
-CONTACT = ("t_s", "distance_m", "north_m", "east_m")
 ROUND_M = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
-ROLES = ("surface", "ink", "muted", "rule", "truth", "flown", "alert", "pad", "padfill", "gps", "flow")
+WIDEST_PX = 0.4 * HIGH_PX  # a tube that is wider would only tint the picture
+TUBE_ELLIPSES = 60  # that a tube of 3 sigma is made of
+ROLES: tuple[str, ...] = ("surface", "ink", "muted", "rule", "truth", "flown", "alert", "pad", "padfill", "gps", "flow")
+ROLES += tuple(role for role in PALETTE if role.startswith("phase-"))
+HERE = Path(__file__).parent
+Placed = Callable[[Course], Array]
 
 
 class Picture(NamedTuple):
@@ -37,118 +35,41 @@ class Picture(NamedTuple):
     words: str
 
 
-class Course(NamedTuple):
-    """A vehicle over the pad: instants (n,), the middle of its skids NED [m], (n, 3), angles [rad]."""
-
-    t_s: Array
-    ned_m: Array
-    pitch: Array
-    heading: Array
-
-
-class Scene(NamedTuple):
-    """What the picture shows; along: the heading [rad] that the side view has to its right."""
-
-    truth: Course
-    said: Course
-    ways: tuple[Course, Course]
-    name: str
-    touch_s: float
-    touch_m: tuple[float, float]
-    along: float
-    half_m: float
-    high_m: float
-    close_m: float
-    pad_m: float
-    shape: Shape
-    wind: tuple[float, float] | None
-    others_m: Array
-    r95_m: float | None
-    flights: int
-
-
 def landing_picture(record: Record, *, alone: bool = False) -> Picture | None:
-    """The picture; None of a record without a touchdown beside a truth. alone: a file of its own, with its colours."""
+    """The picture; None of a record without a touchdown beside a truth.
+
+    A page gets its views as SVGs that wrap where it is narrow; alone: one SVG for a file of its own, with its colours.
+    """
     scene = scene_of(record)
     if scene is None:
         return None
-    words, right = _words(scene), (0, SIDE_PX + GAP_PX, SIDE_PX + ABOVE_PX + 2 * GAP_PX)
-    views = (_side(scene), _above(scene), _close(scene))
-    inside = "".join(f'<g transform="translate({x} 0)">{view}</g>' for x, view in zip(right, views, strict=True))
-    return Picture(
-        f'<svg class="landing" xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDE_PX} {HIGH_PX}" role="img" '
-        f'aria-label="{escape(words)}"><style>{_style(alone)}</style>{inside}</svg>',
-        words,
+    views = [(_side(scene), SIDE_PX), (_above(scene), ABOVE_PX), (_close(scene), CLOSE_PX)]
+    words = _words(scene)
+    return Picture(one_svg(views, words) if alone else side_by_side(views, words), words)
+
+
+def side_by_side(views: Sequence[tuple[str, int]], words: str) -> str:
+    """Views and their widths [px] as SVGs of one height in a row, which a narrow page breaks."""
+    inside = "".join(
+        f'<svg class="landing" xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {wide} {HIGH_PX}" '
+        f'style="flex:{wide} 1 {0.75 * wide:.0f}px" aria-hidden="true"><g>{view}</g></svg>'
+        for view, wide in views
     )
+    return f'<div class="landing-views" role="img" aria-label="{escape(words)}">{inside}</div>'
 
 
-def scene_of(record: Record) -> Scene | None:
-    """What there is to draw; None without a touchdown, a truth and an estimate with attitude beside it."""
-    contact = mapping(mapping(mapping(record.manifest.get("scores")).get("touchdown")).get("contact"))
-    said = "flown" if has(record, "flown", (*POSITION_NED, *QUATERNION)) else "estimate"
-    known = all(has(record, name, (*POSITION_NED, *QUATERNION)) for name in ("truth", said))
-    if not known or record.manifest.get("kind") != "fly" or len(_numbers(contact, CONTACT)) < len(CONTACT):
-        return None
-    shape, touch_s = shape_of(record), contact["t_s"]
-    span = _begins(record, touch_s, shape.skids_below_m), touch_s + AFTER_S
-    truth, flown, *ways = (
-        _course(record, name, np.linspace(*span, count), shape.skids_below_m)
-        for count in (FRAMES, WAY_POINTS)
-        for name in ("truth", said)
+def one_svg(views: Sequence[tuple[str, int]], words: str) -> str:
+    """Views beside each other in one SVG, which has its colours on light and on dark."""
+    wide = sum(width for _, width in views) + GAP_PX * (len(views) - 1)
+    starts = [sum(width + GAP_PX for _, width in views[:k]) for k in range(len(views))]
+    inside = "".join(f'<g transform="translate({x} 0)">{view}</g>' for x, (view, _) in zip(starts, views, strict=True))
+    light, dark = (";".join(f"--{role}:{PALETTE[role][k]}" for role in ROLES) for k in (0, 1))
+    return (
+        f'<svg class="landing" xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {wide} {HIGH_PX}" role="img" '
+        f'aria-label="{escape(words)}"><style>.landing{{{light};--font:{escape(FONT, quote=False)}}}'
+        f"@media(prefers-color-scheme:dark){{.landing{{{dark}}}}}"
+        f"{(HERE / 'landing.css').read_text(encoding='utf-8')}</style>{inside}</svg>"
     )
-    touch = contact["north_m"], contact["east_m"]
-    pad_m = float(record.manifest.get("pad_size_m") or 0.0)
-    reach = float(np.hypot(*truth.ned_m[:, :2].T).max()) + shape.reach_m
-    many = mapping(record.manifest.get("many"))
-    r95 = _numbers(many, ("r95_m",)).get("r95_m")
-    near = [1.6 * contact["distance_m"], r95 or 0.0, 0.03]
-    return Scene(
-        truth, flown, (ways[0], ways[1]), "autopilot's input" if said == "flown" else "estimate", touch_s, touch,
-        float(truth.heading[-1]), min(max(0.6 * pad_m, reach), 8.0), float(np.max(-truth.ned_m[:, 2])) + shape.high_m,
-        1.35 * max(near), pad_m, shape, _wind(record), _others(many), r95,
-        int(_numbers(many, ("flights",)).get("flights", 1)),
-    )  # fmt: skip
-
-
-def _numbers(said: Mapping[str, Any], names: Sequence[str]) -> dict[str, float]:
-    """Those of the names that say a finite number: a manifest comes from a file."""
-    found = {name: said.get(name) for name in names}
-    return {name: float(value) for name, value in found.items() if isinstance(value, int | float) and isfinite(value)}
-
-
-def _others(many: Mapping[str, Any]) -> Array:
-    """Where other flights touched, north and east [m], (n, 2)."""
-    axes = [many.get("north_m"), many.get("east_m")]
-    pairs = zip(*(axis if isinstance(axis, list) else () for axis in axes), strict=False)
-    known = [pair for pair in pairs if all(isinstance(value, float) for value in pair)]
-    return np.asarray(known[:DOTS], float).reshape(-1, 2)
-
-
-def _begins(record: Record, touch_s: float, below_m: float) -> float:
-    """When the picture begins [s]: as the skids are last at FROM_M, within SHOWN_S before the touchdown."""
-    truth = record.tables["truth"]
-    t_s, high_m = np.asarray(truth["t_s"], float), -np.asarray(truth["pos_d_m"], float) - below_m
-    above = t_s[(high_m > FROM_M) & (t_s < touch_s)]
-    shown_s = float(np.clip(touch_s - above[-1] if len(above) else SHOWN_S[1], *SHOWN_S))
-    return max(touch_s - shown_s, float(t_s[0]))
-
-
-def _course(record: Record, name: str, t_s: Array, below_m: float) -> Course:
-    table = record.tables[name]
-    rows = np.clip(np.searchsorted(np.asarray(table["t_s"], float), t_s), 0, len(table["t_s"]) - 1)
-    place, attitude = record.matrix(name, POSITION_NED)[rows], record.matrix(name, QUATERNION)[rows]
-    r = np.asarray(rotation_from_quaternion(*attitude.T))  # rows of the matrix one after the other, (9, n)
-    return Course(t_s, place + below_m * r[[2, 5, 8]].T, np.arcsin(-np.clip(r[6], -1, 1)), np.arctan2(r[3], r[0]))
-
-
-def _wind(record: Record) -> tuple[float, float] | None:
-    """Speed [m/s] and the heading [rad] that the wind blows to; None without one."""
-    parameters = mapping(record.manifest.get("parameters"))
-    stated, drawn = mapping(mapping(parameters.get("scenario")).get("wind")), mapping(parameters.get("drawn"))
-    speed, origin = (drawn.get(f"wind.{key}", stated.get(key)) for key in ("speed_20ft_m_s", "from_direction_deg"))
-    if not isinstance(speed, (int, float)) or not isinstance(origin, (int, float)) or speed <= 0.0:
-        return None
-    return float(speed), float(np.radians(origin + 180.0))
 
 
 # -- the three views -----------------------------------------------------------------------------------------------
@@ -162,7 +83,8 @@ def _side(s: Scene) -> str:
         return np.column_stack([middle + scale * across, ground + scale * course.ned_m[:, 2]])
 
     truth, said = at(s.truth), at(s.said)
-    half = 0.5 * s.pad_m * scale
+    half, (north, east, down) = 0.5 * s.pad_m * scale, s.three_sigma_m.T
+    radii = scale * np.column_stack([np.hypot(north * np.cos(s.along), east * np.sin(s.along)), down])
     step = next((size for size in ROUND_M if scale * size >= 60.0), ROUND_M[-1])
     marks = [k * step for k in range(int(s.high_m / step) + 1)]
     ticks = "".join(
@@ -175,7 +97,8 @@ def _side(s: Scene) -> str:
         _moved(s.shape.side(scale), "vehicle", s, truth, np.degrees(-s.truth.pitch)),
     ]
     compass = f"nose to the right, heading {np.degrees(s.along) % 360.0:.0f}\N{DEGREE SIGN}"
-    return _view(0, SIDE_PX, f"From the side, {compass}", f"{ticks}{pad}{_lines(*map(at, s.ways))}{''.join(moving)}")
+    parts = [ticks, pad, _ways(s, at, radii), *moving, _phase_key(s)]
+    return view(0, SIDE_PX, f"From the side, {compass}", "".join(parts))
 
 
 def _above(s: Scene) -> str:
@@ -195,8 +118,11 @@ def _above(s: Scene) -> str:
     north = '<path class="arrow" d="M14 62V38m-4 7 4-7 4 7"/><text x="14" y="76" text-anchor="middle">N</text>'
     wind = "" if s.wind is None else _wind_arrow(s.wind)
     title = "From above" + (f", the pad is {s.pad_m:g} m square" if s.pad_m else "")
-    return _view(
-        1, ABOVE_PX, title, f"{pad}{_lines(*map(at, s.ways))}{''.join(moving)}{cross}{north}{wind}{_bar(scale)}"
+    return view(
+        1,
+        ABOVE_PX,
+        title,
+        "".join([pad, _ways(s, at, scale * s.three_sigma_m[:, 1::-1]), *moving, cross, north, wind, scale_bar(scale)]),
     )
 
 
@@ -220,23 +146,62 @@ def _close(s: Scene) -> str:
     spot = '<circle r="5"/>'
     moving = [_moved(spot, "ghost", s, said, None), _moved(spot, "vehicle spot", s, truth, None)]
     cross = _cross(x + scale * s.touch_m[1], y - scale * s.touch_m[0], 8.0)
-    ends = [at(way)[way.t_s > s.touch_s - CLOSE_S] for way in s.ways]
+    late = s.ways[1].t_s > s.touch_s - CLOSE_S
+    ends = [at(way)[late] for way in s.ways]
+    tube = _tube(ends[1], scale * s.three_sigma_m[late, 1::-1])
     away = float(np.hypot(*s.touch_m))
     title = f"Touchdown, {metres(away)} m off the centre"
-    return _view(2, CLOSE_PX, title,
-                 f"{centre}{dots}{_lines(*ends)}{''.join(moving)}{ring}{cross}{_bar(scale)}{_key(s)}")  # fmt: skip
+    parts = [tube, centre, dots, _lines(*ends), *moving, ring, cross, scale_bar(scale), _key(s, bool(tube))]
+    return view(2, CLOSE_PX, title, "".join(parts))
 
 
 # -- what they are made of -----------------------------------------------------------------------------------------
-def _view(number: int, wide: float, title: str, inside: str) -> str:
+def view(number: int, wide: float, title: str, inside: str) -> str:
+    """A view under its title; number: which of its picture, wide [px]."""
     clip = f'<clipPath id="landing-{number}"><rect y="22" width="{wide}" height="{HIGH_PX - 22}" rx="6"/></clipPath>'
     head = f'<text class="title" x="0" y="13">{escape(title)}</text>'
     return f'{clip}{head}<g clip-path="url(#landing-{number})">{inside}</g>'
 
 
+def _ways(s: Scene, at: Placed, radii: Array) -> str:
+    """The paths of truth, under it its phases in colour, and of the estimate, under it its tube of 3 sigma [px]."""
+    truth, said = map(at, s.ways)
+    t_s, coloured = s.ways[0].t_s, []
+    for phase in s.phases:
+        part = truth[(t_s >= phase.t0) & (t_s <= phase.t1)]
+        if len(part) > 1:
+            colour = f'style="stroke:var(--phase-{escape(phase.name)})"'
+            coloured.append(f'<polyline class="phase-way" {colour} points="{_points(part)}"/>')
+    return f"{_tube(said, radii)}{''.join(coloured)}{_lines(truth, said)}"
+
+
+def _tube(way: Array, radii: Array) -> str:
+    """Ellipses of 3 sigma along a path, which together are its tube; nothing where none is stated."""
+    every = max(1, len(way) // TUBE_ELLIPSES)
+    rows = zip(way[::every], radii[::every], strict=True)
+    shown = [(*place, *radius) for place, radius in rows if np.isfinite(radius).all() and max(radius) < WIDEST_PX]
+    ellipses = "".join(f'<ellipse cx="{x:.1f}" cy="{y:.1f}" rx="{a:.1f}" ry="{b:.1f}"/>' for x, y, a, b in shown)
+    return f'<g class="tube">{ellipses}</g>' if ellipses else ""
+
+
+def _phase_key(s: Scene) -> str:
+    """The colours of the phases that the picture shows."""
+    t0, t1 = s.ways[0].t_s[0], s.ways[0].t_s[-1]
+    names = list(dict.fromkeys(phase.name for phase in s.phases if phase.t0 < t1 and phase.t1 > t0))
+    return "".join(
+        f'<rect x="{SIDE_PX - 84}" y="{30 + 16 * k}" width="10" height="10" rx="2" '
+        f'style="fill:var(--phase-{escape(name)})"/><text x="{SIDE_PX - 70}" y="{39 + 16 * k}">{escape(name)}</text>'
+        for k, name in enumerate(names)
+    )
+
+
 def _lines(truth: Array, said: Array) -> str:
-    drawn = (("truth", truth), ("flown", said))
-    return "".join(f'<polyline class="way {role}" points="{_points(way)}"/>' for role, way in drawn)
+    return polyline("way truth", truth) + polyline("way flown", said)
+
+
+def polyline(role: str, way: Array) -> str:
+    """A line through places (n, 2) [px], those that are numbers."""
+    return f'<polyline class="{role}" points="{_points(way)}"/>'
 
 
 def _points(way: Array) -> str:
@@ -249,16 +214,17 @@ def _moved(shape: str, role: str, s: Scene, way: Array, degrees: Array | None) -
     x, y = way[still]
     turn = "" if degrees is None else f" rotate({degrees[still]:.1f})"
     turning = (
-        "" if degrees is None else _animated("rotate", [f"{angle:.1f}" for angle in np.unwrap(degrees, period=360)])
+        "" if degrees is None else animated("rotate", [f"{angle:.1f}" for angle in np.unwrap(degrees, period=360)])
     )
-    going = _animated("translate", [f"{a:.1f} {b:.1f}" for a, b in way])
+    going = animated("translate", [f"{a:.1f} {b:.1f}" for a, b in way])
     return (
         f'<g class="still {role}" transform="translate({x:.1f} {y:.1f}){turn}">{shape}</g>'
         f'<g class="moving {role}">{going}<g>{turning}{shape}</g></g>'
     )
 
 
-def _animated(kind: str, values: Sequence[str]) -> str:
+def animated(kind: str, values: Sequence[str]) -> str:
+    """A motion ("translate" or "rotate") through values in the loop."""
     return (
         f'<animateTransform attributeName="transform" type="{kind}" dur="{LOOP_S:g}s" repeatCount="indefinite" '
         f'values="{";".join(values)}"/>'
@@ -279,17 +245,18 @@ def _wind_arrow(wind: tuple[float, float]) -> str:
     )
 
 
-def _bar(scale: float) -> str:
-    """A bar of a round length."""
-    length = max((size for size in ROUND_M if scale * size <= 110.0), default=ROUND_M[0])
+def scale_bar(scale: float, lengths_m: Sequence[float] = ROUND_M) -> str:
+    """A bar of a round length, scale in px/m."""
+    length = max((size for size in lengths_m if scale * size <= 110.0), default=lengths_m[0])
     said = f"{100 * length:g} cm" if length < 1.0 else f"{length:g} m"
     right = f"M8 {HIGH_PX - 10}v4h{scale * length:.1f}v-4"
     return f'<path class="arrow" d="{right}"/><text x="{12}" y="{HIGH_PX - 11}">{said}</text>'
 
 
-def _key(s: Scene) -> str:
+def _key(s: Scene, tube: bool) -> str:
     """The names of the colours."""
-    rows = [("truth", "truth"), ("flown", s.name), ("alert", "touchdown")]
+    band = [("band", "3 \N{GREEK SMALL LETTER SIGMA}")] if tube else []
+    rows = [("truth", "truth"), ("flown", s.name), *band, ("alert", "touchdown")]
     return "".join(
         f'<text class="key {role}" x="{CLOSE_PX - 2}" y="{HIGH_PX - 10 - 15 * k}">{escape(name)}</text>'
         for k, (role, name) in enumerate(reversed(rows))
@@ -302,17 +269,5 @@ def _words(s: Scene) -> str:
     off, lasts = metres(float(np.hypot(*s.touch_m))), s.touch_s - float(s.truth.t_s[0])
     return (
         f"The last {lasts:.0f} s before the touchdown, {off} m off the pad's centre, in a loop of {LOOP_S:g} s; the "
-        f"vehicle is to scale. Dashed: {s.name}, what the navigator made of it.{wind}{ring}"
-    )
-
-
-def _style(alone: bool) -> str:
-    """The picture's own rules; a page brings the colours, a file of its own has them on light and on dark."""
-    rules = (Path(__file__).parent / "landing.css").read_text(encoding="utf-8")
-    if not alone:
-        return rules
-    light, dark = (";".join(f"--{role}:{PALETTE[role][k]}" for role in ROLES) for k in (0, 1))
-    return (
-        f".landing{{{light};--font:{escape(FONT, quote=False)}}}"
-        f"@media(prefers-color-scheme:dark){{.landing{{{dark}}}}}{rules}"
+        f"vehicle is to scale. Dashed: {s.name}, what the navigator estimates.{wind}{ring}"
     )

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from flownav.core.record import Record, mapping
 from flownav.report import series
 from flownav.report.figures_innovation import SENSOR_TITLES
@@ -188,8 +190,8 @@ def rejected_rows(record: Record, phases: Sequence[Phase] = ()) -> list[tuple[st
 
 
 def sensor_rows(record: Record) -> list[tuple[str, ...]]:
-    """Sensors as (name, from and to in seconds, components fused in flight, their mean square, share refused [%],
-    verdict).
+    """Sensors as (name, from and to [s], rate [Hz], longest gap [s], components fused in flight, their mean square,
+    share refused [%], verdict).
     """
     scores = mapping(record.manifest.get("scores"))
     spans, judged = mapping(scores.get("coverage")), mapping(scores.get("consistency"))
@@ -203,5 +205,15 @@ def sensor_rows(record: Record) -> list[tuple[str, ...]]:
             refused = float(found.get("refused") or 0.0)
             lost = number(100.0 * refused, 1)
             said = verdict(float(found.get("nis_per_dof") or 0.0), white=bool(found.get("white")), refused=refused)
-        rows.append((SENSOR_TITLES.get(name, name.replace("_", " ")), span_s, tested, mean, lost, said))
+        title = SENSOR_TITLES.get(name, name.replace("_", " "))
+        rows.append((title, span_s, *_pace(record, name), tested, mean, lost, said))
     return rows
+
+
+def _pace(record: Record, name: str) -> tuple[str, str]:
+    """A sensor's mean rate [Hz] and its longest gap [s] between readings; dashes where the record lacks them."""
+    t_s = np.sort(np.asarray(record.tables.get(name, {}).get("t_s", ()), float))
+    t_s = t_s[np.isfinite(t_s)]
+    if len(t_s) < 2 or t_s[-1] <= t_s[0]:
+        return NONE, NONE
+    return number((len(t_s) - 1) / float(t_s[-1] - t_s[0]), 1), number(float(np.max(np.diff(t_s))), 2)

@@ -9,9 +9,13 @@ import pytest
 import made_flights
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor, Stream
+from flownav.logs.open_log import open_flight
 from flownav.scoring.reference import Motion
 from made.classes import make
-from made.flight import GRAVITY_M_S2, Truth, into_body
+from made.flight import GRAVITY_M_S2, Truth, into_body, write
+from made.gps_free import Path3, Row, path_of
+from made.gps_free import markdown as as_markdown
+from made.gps_free import row_of as row_of_log
 from made.judging import NEVER, Line, Verdict, judge, line_of, truth_of
 from made.likeness import _bands, _rough, compared
 from made.reckoning import reckoned, rest_of
@@ -294,3 +298,40 @@ def test_the_page_has_the_marks():
     page = Path(PROJECT / "docs" / "explanation" / "made-flights.md").read_text(encoding="utf-8")
     for what in (made_flights.JUDGED, made_flights.COMPARED):
         assert all(mark in page for mark in made_flights.marks(what))
+
+
+# -- recorded flights without GPS -----------------------------------------------------------------------------------
+@pytest.mark.parametrize("name", ["a-clean", "b-yaw"])
+def test_a_recorded_flight_has_the_row_that_its_judge_knows_from_the_exact_truth(tmp_path, name):
+    """Read back from its files, without what made it; the judge has the truth itself and the instants of flight."""
+    made = make(name, 3)
+    write(made, tmp_path / name)
+    known, found = judge(made), row_of_log(name, open_flight(tmp_path / name))
+    assert found is not None
+    for ours, theirs in ((found.ours, known.ours), (found.line, known.line)):
+        assert ours.end_m == pytest.approx(theirs.end_m, abs=0.05)
+        assert ours.most_m == pytest.approx(theirs.worst_m, abs=0.05)
+        assert ours.heading_deg == pytest.approx(theirs.heading_deg, abs=0.3)
+    assert found.level_m == pytest.approx(known.level_m, rel=0.1)
+    assert found.unsaid == pytest.approx(known.unsaid, abs=0.01)
+
+
+def test_errors_of_a_path_are_those_of_a_line_that_bends_away_whole_turns_aside():
+    t_s = np.linspace(0.0, 10.0, 101)
+    truth = Motion(t_s, np.column_stack([t_s, 0.0 * t_s, 0.0 * t_s]), t_s, 0.0 * t_s)
+    bent = Motion(t_s, np.column_stack([t_s, 0.02 * t_s**2, 0.0 * t_s]), t_s, 2.0 * np.pi + 0.01 * (t_s - 2.0))
+    found = path_of(bent, truth, (2.0, 8.0))
+    assert found is not None
+    assert found.end_m == pytest.approx(0.02 * (64.0 - 4.0), rel=1e-6)
+    assert found.most_m == found.end_m
+    assert found.heading_deg == pytest.approx(np.rad2deg(0.06), rel=1e-6)
+    assert path_of(bent, truth._replace(heading_t_s=np.zeros(0), heading_rad=np.zeros(0)), (2.0, 8.0)) is None
+
+
+def test_the_table_has_a_row_a_flight_their_median_and_their_worst():
+    row = Row("one", Path3(0.1, 0.5, 2.0), Path3(0.2, 0.6, 4.0), 3.0, 0.0)
+    lines = as_markdown([row, row._replace(name="two", ours=Path3(0.3, 0.7, 1.0), unsaid=0.25)]).splitlines()
+    assert len(lines) == 6
+    assert lines[2] == "| one | 0.10 | 0.50 | 2.0 | 0.20 | 0.60 | 4.0 | 3.0 | 0.0 |"
+    assert lines[4] == "| **median** | 0.20 | 0.60 | 1.5 | 0.20 | 0.60 | 4.0 | 3.0 | 12.5 |"
+    assert lines[5] == "| **worst** | 0.30 | 0.70 | 2.0 | 0.20 | 0.60 | 4.0 | 3.0 | 25.0 |"

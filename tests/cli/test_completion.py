@@ -49,7 +49,7 @@ def completed(tmp_path, monkeypatch, capsys):
     ("flownav certify approach_", ["approach_8_m_s"]),
     ("flownav accuracy --cases takeoff,app", ["takeoff,approach", "takeoff,approach_8_m_s"]),
     ("flownav identify x --order 2", ["2", "2+delay"]),
-    ("flownav identify x --for ", ["px4", "ardupilot"]),
+    ("flownav identify x --for ", ["px4", "ardupilot", "inav"]),
     ("flownav export x.fnr --to e", ["euroc"]),
     ("flownav live udp:14550 --send l", ["landing-target"]),
     ("flownav sample data", ["dataflash"]),

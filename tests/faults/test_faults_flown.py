@@ -188,10 +188,10 @@ def test_json_has_what_became_of_the_flights():
 def test_the_table_says_landed_around_and_crashed():
     done = command("--faults", "gps_loss", "--heights", "1.5", "--durations", "5", "--flights", "3")
     assert done.exit_code == 0, done.output
-    line = next(line for line in done.stdout.splitlines() if "gps_loss" in line)
-    cells = [cell.strip() for cell in line.strip("│ ").split("│")]
-    assert cells[:3] == ["gps_loss", "1.5", "5"]
-    assert cells[7:10] == ["3", "0", "0"]
+    lines = [line for line in done.stdout.splitlines() if "gps_loss" in line]
+    cells = [cell.strip() for line in lines for cell in line.strip("│ ").split("│") if cell.strip() != "gps_loss"]
+    assert cells[:2] == ["1.5", "5"]
+    assert cells[6:9] == ["3", "0", "0"]  # landed, around, crashed: in two tables where 80 columns do not hold one
 
 
 def test_flow_is_as_late_at_another_rate():

@@ -29,7 +29,7 @@ def test_a_reading_with_three_components_refused_is_one():
     rows += [(2.0, position, k, gate) for k in range(3)]
     rows += [(3.0, position, 0, Reason.FUSED), (3.0, position, 1, gate), (3.0, position, 2, Reason.FUSED)]
     assert reading_scores(offers(*rows), gps()) == {
-        "gps_position": {"offered": 3, "fused": 1, "in_part": 1, "rejected": {"innovation_gate": 2}}
+        "gps_position": {"offered": 3, "read": 3, "fused": 1, "in_part": 1, "rejected": {"innovation_gate": 2}}
     }
 
 
@@ -41,7 +41,7 @@ def test_two_readings_at_one_instant_are_two():
 def test_rows_that_the_reader_threw_away_are_added_to_the_filters():
     rows = [(1.0, Sensor.GPS_POSITION, k, Reason.OUT_OF_RANGE) for k in range(3)]
     found = reading_scores(offers(*rows), gps({"no_fix": 7, "out_of_range": 2}))["gps_position"]
-    assert found == {"offered": 1, "fused": 0, "in_part": 0, "rejected": {"no_fix": 7, "out_of_range": 3}}
+    assert found == {"offered": 1, "read": 10, "fused": 0, "in_part": 0, "rejected": {"no_fix": 7, "out_of_range": 3}}
 
 
 def test_components_keep_the_readers_count_of_the_same_reason():
@@ -65,7 +65,7 @@ def test_a_vertical_velocity_that_gps_does_not_tell_is_no_rejection():
     rows[[2, 3, 5, 6], 3] = np.nan
     streams = {velocity: Stream.of(velocity, np.arange(2.0), np.zeros((2, 3))), **gps()}
     found = reading_scores(rows, streams)
-    assert found["gps_velocity"] == {"offered": 2, "fused": 1, "in_part": 1, "rejected": {"not_finite": 1}}
+    assert found["gps_velocity"] == {"offered": 2, "read": 2, "fused": 1, "in_part": 1, "rejected": {"not_finite": 1}}
     assert found["gps_position"]["rejected"] == {"not_finite": 1}
 
     class Flown:

@@ -96,10 +96,10 @@ def test_protection_levels_are_told_with_the_share_of_errors_beyond_them(folder,
 
 
 def test_an_error_beyond_the_level_that_nothing_says_is_counted(hall):
-    """From 20 s of 40 s on the truth is 100 m away."""
+    """From 20 s of 40 s on the truth moves away by 10 m/s, up to 100 m: no leap, which would be a reference's error."""
     lines = (hall / "truth.csv").read_text().splitlines()
     rows = [line.split(",") for line in lines[1:]]
-    moved = [[t, str(float(x) + (100.0 if float(t) >= 20.0 else 0.0)), y, z] for t, x, y, z in rows]
+    moved = [[t, str(float(x) + min(max(10.0 * (float(t) - 20.0), 0.0), 100.0)), y, z] for t, x, y, z in rows]
     (hall / "truth.csv").write_text("\n".join([lines[0], *map(",".join, moved)]) + "\n")
     found = answer(hall)["protection"]
     assert found["exceeded_unsaid_fraction"] > 0.3
@@ -150,7 +150,7 @@ def test_a_sensor_that_falls_silent_is_a_warning_in_all_that_is_said(hall):
     assert f"Warning: {said}" in told.stdout
     assert "Rangefinder" in told.stdout
     assert "refused [%]" not in told.stdout
-    assert "refused [%]" in call(hall, "--force", "--verbose").stdout
+    assert "NIS" in call(hall, "--force", "--verbose").stdout
     page = Path("out/hall.html").read_text()
     assert said in page
     assert "0.0 to 24.9" in page
@@ -215,7 +215,7 @@ def test_a_wrong_option_is_one_line_and_leaves_no_file(folder, arguments, said):
 
 
 def test_a_folder_that_is_not_there(tmp_path):
-    assert "no such log; give a folder of CSV files, a PX4 ULog" in complaint(tmp_path / "absent")
+    assert "no such log; give a folder of CSV files" in complaint(tmp_path / "absent")
 
 
 def test_a_record_that_cannot_be_written(folder, tmp_path):

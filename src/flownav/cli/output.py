@@ -232,10 +232,14 @@ LEAST_WORDS = 20  # columns that a column of words is not made narrower than
 
 
 def fitted(made: Table, console: Console) -> Iterator[Table]:
-    """A table in the console's width: with broken heads and words, or else its columns in tables one under the other,
-    each of which begins with the first column.
+    """A table in the console's width: as it is where it fits, or with broken heads and words, or else its columns in
+    tables one under the other, each of which begins with the first column.
     """
     from rich.measure import Measurement
+
+    if Measurement.get(console, console.options.update(max_width=10_000), made).maximum <= console.width:
+        yield made
+        return
 
     def too_wide(chosen: list[int]) -> bool:
         part = _with_columns(made, chosen)

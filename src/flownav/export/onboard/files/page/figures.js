@@ -119,8 +119,21 @@ export function protection(estimates) {
   return told.length ? { horizontal_m: summary(0), vertical_m: summary(1) } : null;
 }
 
-// By sensor: components that were not fused, by reason; and innovations squared over what was expected of them.
-export function innovationScores(innovations, SENSOR, REASON) {
+// Whether an instant is in flight by a signal that is 1 on the ground; always where it knows of no flight.
+function aloft(landed) {
+  const [value] = landed.columns, flies = value.some((v) => v < 0.5);
+  return (t) => {
+    if (!flies) return true;
+    let row = 0;
+    while (row + 1 < landed.t.length && landed.t[row + 1] <= t) row += 1;
+    return value[row] < 0.5;
+  };
+}
+
+// By sensor: components that were not fused, by reason; and innovations squared over what was expected of them, of those that
+// were fused in flight. landed: what says when it flies.
+export function innovationScores(innovations, landed, SENSOR, REASON) {
+  const flies = aloft(landed);
   const names = Object.fromEntries(Object.entries(SENSOR).map(([name, value]) => [value, name.toLowerCase()]));
   const labels = Object.fromEntries(Object.entries(REASON).map(([name, value]) => [value, name.toLowerCase()]));
   const beside = new Set(innovations.filter((row) => Number.isFinite(row.observation)).map((row) => `${row.sensor} ${row.t_s}`));
@@ -128,7 +141,7 @@ export function innovationScores(innovations, SENSOR, REASON) {
   const rejected = {}, tested = {};
   for (const row of innovations) {
     const name = names[row.sensor], leftOut = mayLeaveOut.has(row.sensor) && row.component === 2 && Number.isNaN(row.observation);
-    if (row.reason === REASON.FUSED || row.reason === REASON.INNOVATION_GATE) (tested[name] ??= []).push(row);
+    if (row.reason === REASON.FUSED && flies(row.t_s)) (tested[name] ??= []).push(row);
     if (row.reason === REASON.FUSED || row.reason === REASON.DATUM) continue;
     if (leftOut && row.reason === REASON.NOT_FINITE && beside.has(`${row.sensor} ${row.t_s}`)) continue;
     const counts = (rejected[name] ??= {});

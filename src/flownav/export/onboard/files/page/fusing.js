@@ -80,7 +80,7 @@ export function scores(flown, fed, truth, delayS, cut) {
       velocity_rms_m_s: told.t.length ? figures.horizontalRms(velocity, told) : null,
       ...(against ? { truth: said } : {}),
       protection: figures.protection(flown.estimates),
-      ...figures.innovationScores(flown.innovations, SENSOR, REASON),
+      ...figures.innovationScores(flown.innovations, stream(fed, SENSOR.LANDED, 1), SENSOR, REASON),
     },
     path, error, moved,
   };

@@ -131,6 +131,7 @@ def see_ground(
         unranged=0.0 if told else 1.0,
         disputed_m=abs(ranged.contradiction_m) if newest and known else 0.0,
         reason=SILENT,
+        unscaled=1.0,
     )
 
 

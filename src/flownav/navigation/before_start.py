@@ -7,10 +7,10 @@ import numpy as np
 from flownav.core.compile import Lanes, Work, equation, procedure, replacing, squared
 from flownav.core.measurement import Sensor
 from flownav.navigation.inertial import STEADY_S, is_possible
-from flownav.navigation.motion_records import ForceBlocks, ImuMemory
+from flownav.navigation.motion_records import ImuMemory
 from flownav.navigation.records import Reading, StartMemory
 from flownav.navigation.verdicts import on_lanes
-from flownav.navigation.vibration import followed_blocks, with_reading
+from flownav.navigation.vibration import with_reading
 
 MOST_LEVELLING = 100.0  # readings whose mean is level: 2 s at 50 Hz
 with_force = replacing(StartMemory, "force_x", "force_y", "force_z", "readings", "shaken", "since_s")
@@ -68,17 +68,15 @@ class Levelled(NamedTuple):
 
     start: StartMemory
     imu: ImuMemory
-    blocks: ForceBlocks
 
 
 @on_lanes
-def note_force(reading: Reading, m: StartMemory, imu: ImuMemory, blocks: ForceBlocks, *, t_s: float) -> Levelled:
+def note_force(reading: Reading, m: StartMemory, imu: ImuMemory, *, t_s: float) -> Levelled:
     """The latest inertial reading before the start, and the mean specific force."""
     noted = m.started == 0.0 and reading.arrived > 0.0 and is_possible(reading)
     return Levelled(
         levelled(reading, felt(reading, m, t_s - imu.read_s), t_s) if noted else m,
         with_reading(reading, t_s, imu) if noted else imu,
-        followed_blocks(reading, t_s, blocks) if noted else blocks,
     )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from flownav.core.compile import Lanes, Work, arctan2, equation, larger, procedure, replacing
 from flownav.core.frames import rotation_from_quaternion, to_earth
+from flownav.core.measurement import Sensor
 from flownav.estimation.covariance import expect, states_of
 from flownav.estimation.hypotheses import HEADING_OFF, sign_all
 from flownav.estimation.laws.attitude import heading
@@ -135,7 +136,7 @@ def judge_yaw(
 
 @procedure
 def conclude_heading(work: Work, lanes: Lanes, t_s: float, sensor: int, s: AttitudeSettings, o: Output) -> None:
-    """The heading that was judged, tested and fused."""
+    """The heading that was judged is held against the gate of one, fused and written down."""
     heading(work, lanes, 0)
     sign_all(work, lanes, HEADING_OFF, 1.0)
     offer_what_is_sound(work, lanes)
@@ -145,16 +146,11 @@ def conclude_heading(work: Work, lanes: Lanes, t_s: float, sensor: int, s: Attit
 
 
 @procedure
-def take_mag(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p: Work, o: Output) -> None:
-    """A magnetometer."""
+def take_heading(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p: Work, o: Output) -> None:
+    """A magnetometer, or a heading from elsewhere."""
     s = load_attitude_settings(p)
-    judge_field(work, lanes, t_s, fitted.declination_rad, s)
-    conclude_heading(work, lanes, t_s, sensor, s, o)
-
-
-@procedure
-def take_yaw(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p: Work, o: Output) -> None:
-    """An external heading."""
-    s = load_attitude_settings(p)
-    judge_yaw(work, lanes, t_s, fitted.heading == FROM_YAW, s)
+    if sensor == Sensor.MAG:
+        judge_field(work, lanes, t_s, fitted.declination_rad, s)
+    else:
+        judge_yaw(work, lanes, t_s, fitted.heading == FROM_YAW, s)
     conclude_heading(work, lanes, t_s, sensor, s, o)

@@ -6,6 +6,7 @@ import numpy as np
 
 from flownav.core.compile import equation, larger, replacing
 from flownav.navigation.motion_records import (
+    ForceBlocks,
     ImuMemory,
     MotionMemory,
     MotionStep,
@@ -152,7 +153,7 @@ class StepMotion(NamedTuple):
 
 @on_lanes
 def judge_motion(
-    reading: Reading, start: StartMemory, memory: MotionMemory, doubt: AccelFactors,
+    reading: Reading, start: StartMemory, memory: MotionMemory, blocks: ForceBlocks, doubt: AccelFactors,
     *, t_s: float, step_s: float, heard: bool, s: ImuSettings,
 ) -> StepMotion:  # fmt: skip
     """What moves the filter over the step to t_s: the readings at its ends, the newest reading, or none.
@@ -160,7 +161,7 @@ def judge_motion(
     heard: an inertial reading is at hand; where none ever is, none stands for the step. After a gap it knows nothing of
     the gap, which is coasted. Where no time passes there is no gap.
     """
-    m, blocks, spent, owed, before = memory
+    m, spent, owed, before = memory
     started = start.started > 0.0
     period_s = t_s - m.read_s
     fresh = period_s <= s.imu_stale_s
@@ -196,7 +197,6 @@ def judge_motion(
                 gyro_power=followed_gyro_power(reading, m, period_s) if now and fresh else m.gyro_power,
                 gap=1.0 if step_s > 0.0 and started and not moving else m.gap,
             ),
-            followed_blocks(reading, t_s, blocks) if now and started else blocks,
             SpentMotion(p.spent, q.spent, r.spent, x.spent, y.spent, z.spent),
             OwedMotion(p.owed, q.owed, r.owed, x.owed, y.owed, z.owed),
             tones,
@@ -215,6 +215,12 @@ def steady_force(before: SteadyForce, force: Force, *, dt_s: float) -> SteadyFor
         before.east_m_s2 + share * (force.east_m_s2 - before.east_m_s2),
         before.down_m_s2 + share * (force.down_m_s2 - before.down_m_s2),
     )
+
+
+@on_lanes
+def watch_force(reading: Reading, m: ForceBlocks, *, t_s: float) -> ForceBlocks:
+    """The reading at hand goes into the mean force over a block, before the start as after it."""
+    return followed_blocks(reading, t_s, m) if sound(reading) else m
 
 
 @on_lanes

@@ -254,7 +254,6 @@ class MotionMemory(NamedTuple):
     """All that is remembered of inertial readings from step to step."""
 
     imu: ImuMemory
-    blocks: ForceBlocks
     spent: SpentMotion
     owed: OwedMotion
     tones: ToneMemory

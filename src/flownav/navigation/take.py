@@ -23,9 +23,9 @@ from flownav.navigation.course import find_heading, note_flow_course, seeks
 from flownav.navigation.flow import take_flow
 from flownav.navigation.gps import take_gps
 from flownav.navigation.ground import walk_below
-from flownav.navigation.heading import take_mag, take_yaw
+from flownav.navigation.heading import take_heading
 from flownav.navigation.height import take_range
-from flownav.navigation.inertial import judge_motion, keep_imu, steady_force
+from flownav.navigation.inertial import judge_motion, keep_imu, steady_force, watch_force
 from flownav.navigation.journal import note_decay, note_estimate, note_prediction, reset_state
 from flownav.navigation.lagged_flow import flow_lag
 from flownav.navigation.memory import (
@@ -101,6 +101,7 @@ def arrive(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment,
         keep_imu(work, lanes, t_s)
     if sensor == Sensor.IMU:
         watch_imu(work, lanes)
+        watch_force(work, lanes, t_s)
     if t_s - shared(work, lanes, ERRORS_CLOCK) >= LONGEST_LAG_OF_ERRORS_S:
         catch_up_errors(work, lanes, t_s, p, o)
     share(work, lanes, CLOCK, t_s)
@@ -183,13 +184,9 @@ def take(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p
     elif sensor == Sensor.ATTITUDE:
         catch_up_errors(work, lanes, t_s, p, o)
         take_attitude(work, lanes, t_s, sensor, fitted, p, o)
-    elif sensor == Sensor.MAG:
-        if fitted.heading == FROM_MAG:
-            catch_up_errors(work, lanes, t_s, p, o)
-            take_mag(work, lanes, t_s, sensor, fitted, p, o)
-    elif sensor == Sensor.YAW:
+    elif sensor == Sensor.YAW or (sensor == Sensor.MAG and fitted.heading == FROM_MAG):
         catch_up_errors(work, lanes, t_s, p, o)
-        take_yaw(work, lanes, t_s, sensor, fitted, p, o)
+        take_heading(work, lanes, t_s, sensor, fitted, p, o)
     elif sensor == Sensor.POSE:
         take_pose(work, lanes, t_s, sensor, p, o)
     elif sensor == Sensor.PAD:

@@ -18,8 +18,9 @@ from flownav.replays.judged import airborne_of
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
 from flownav.scoring.path import motion_of, truth_motion
-from flownav.scoring.reference import Motion, Window, drift_of, exceeded_unsaid
+from flownav.scoring.reference import drift_of, exceeded_unsaid
 from made.flight import Table
+from made.judging import Line, line_of
 from made.reckoning import reckoned
 
 NEEDED = (Sensor.IMU, Sensor.FLOW_RATE, Sensor.RANGE)
@@ -29,22 +30,14 @@ HEADINGS = (
 )  # fmt: skip
 
 
-class Path3(NamedTuple):
-    """A path that was right at take-off: its error at the end and at most [m], that of its heading at the end [deg]."""
-
-    end_m: float
-    most_m: float
-    heading_deg: float
-
-
 class Row(NamedTuple):
     """One flight. level_m: protection level, median in flight; unsaid: share of the flight in which the error is beyond
     it without a warning.
     """
 
     name: str
-    ours: Path3
-    line: Path3
+    ours: Line
+    line: Line
     level_m: float
     unsaid: float
 
@@ -86,27 +79,16 @@ def row_of(name: str, log: Log) -> Row | None:
     truth = truth_motion(log.truth, log.heading_truth)
     options, settings = as_fed(log, ReplayOptions(), None)
     flown = replay(log, options, settings)
-    drift = drift_of(motion_of(flown.table), truth, flight)
-    ours, line = path_of(motion_of(flown.table), truth, flight), path_of(reckoned(tables_of(log)), truth, flight)
-    if drift is None or ours is None or line is None:
+    estimate = motion_of(flown.table)
+    drift = drift_of(estimate, truth, flight)
+    if drift is None:
         return None
     stated, level = flown.said, flown.said.protection_m[:, 0]
     inside = (stated.t_s >= flight[0]) & (stated.t_s <= flight[1])
     warned = flagged(stated.t_s, flags_of(flown.written.event))
     unsaid = exceeded_unsaid(stated.t_s, level, warned, drift)
+    ours, line = (line_of(path, truth, flight) for path in (estimate, reckoned(tables_of(log))))
     return Row(name, ours, line, float(np.median(level[inside])), float(unsaid))
-
-
-def path_of(estimate: Motion, truth: Motion, flight: Window) -> Path3 | None:
-    """The errors of a path from take-off to landing."""
-    drift = drift_of(estimate, truth, flight)
-    if drift is None or not len(truth.heading_t_s) or not len(estimate.heading_t_s):
-        return None
-    at = np.array([drift.t_s[0], drift.t_s[-1]])
-    ours = np.interp(at, estimate.heading_t_s, np.unwrap(estimate.heading_rad))
-    theirs = np.interp(at, truth.heading_t_s, np.unwrap(truth.heading_rad))
-    turn = float(np.rad2deg(np.diff(ours - theirs)[0]))
-    return Path3(float(drift.horizontal_m[-1]), float(drift.horizontal_m.max()), abs((turn + 180.0) % 360.0 - 180.0))
 
 
 def rows_of(names: Sequence[str], paths: Sequence[Path]) -> list[Row]:

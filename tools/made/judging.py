@@ -17,7 +17,7 @@ from flownav.replays.judged import TESTED
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import Replay, replay
 from flownav.scoring.path import motion_of
-from flownav.scoring.reference import Motion, drift_of, exceeded_unsaid
+from flownav.scoring.reference import Motion, Window, drift_of, exceeded_unsaid
 from made.flight import Made, Truth, heading_of, into_body, write
 from made.reckoning import reckoned
 from made.signs import Errors, signs_of
@@ -63,7 +63,7 @@ class Verdict(NamedTuple):
 def judge(made: Made) -> Verdict:
     """Write the flight, read it as any log, replay it by the defaults, and hold both lines against the truth."""
     truth = truth_of(made.truth)
-    line = line_of(reckoned(made.tables), truth, made.truth)
+    line = line_of(reckoned(made.tables), truth, window_of(made.truth))
     path_m = path_length(made.truth)
     try:
         with tempfile.TemporaryDirectory() as folder:
@@ -85,7 +85,7 @@ def _lost(made: Made, line: Line, path_m: float, why: str) -> Verdict:
 
 def _verdict(made: Made, flown: Replay, truth: Motion, line: Line, path_m: float) -> Verdict:
     estimate = motion_of(flown.table)
-    window = (made.truth.take_off_s, made.truth.landing_s)
+    window = window_of(made.truth)
     drift = drift_of(estimate, truth, window)
     said = flown.said
     inside = (said.t_s >= window[0]) & (said.t_s <= window[1])
@@ -95,7 +95,7 @@ def _verdict(made: Made, flown: Replay, truth: Motion, line: Line, path_m: float
     level = said.protection_m[:, 0]
     errors = errors_of(flown, made.truth)
     return Verdict(
-        made.name, made.number, path_m, line_of(estimate, truth, made.truth), line,
+        made.name, made.number, path_m, line_of(estimate, truth, window), line,
         float(np.median(level[inside])), exceeded_unsaid(said.t_s, level, warned, drift), float(warned[inside].mean()),
         nis(flown, FLOW, window), nis(flown, (Sensor.RANGE,), window), errors.squares, signs_of(errors, flown, drift),
     )  # fmt: skip
@@ -109,22 +109,26 @@ def truth_of(truth: Truth) -> Motion:
     return Motion(truth.t_s[rows], truth.pos_ned_m[rows], truth.t_s[rows], heading)
 
 
+def window_of(truth: Truth) -> Window:
+    """Take-off and landing [s]."""
+    return truth.take_off_s, truth.landing_s
+
+
 def path_length(truth: Truth) -> float:
     """The level way flown [m], without the smallest of its wobble."""
     return float(np.hypot(*np.diff(truth.pos_ned_m[::200, :2], axis=0).T).sum())
 
 
-def line_of(estimate: Motion, truth: Motion, known: Truth) -> Line:
-    """The errors of a path that was right at take-off."""
-    window = (known.take_off_s, known.landing_s)
-    drift = drift_of(estimate, truth, window)
+def line_of(estimate: Motion, truth: Motion, flight_s: Window) -> Line:
+    """The errors of a path that was right at take-off. flight_s: take-off and landing."""
+    drift = drift_of(estimate, truth, flight_s)
     if drift is None:
         return Line(NEVER, NEVER, NEVER)
-    at = np.array(window)
+    at = np.array(flight_s)
     ours = np.interp(at, estimate.heading_t_s, np.unwrap(estimate.heading_rad))
-    theirs = np.interp(at, truth.heading_t_s, truth.heading_rad)
+    theirs = np.interp(at, truth.heading_t_s, np.unwrap(truth.heading_rad))
     turn = float(np.diff(ours - theirs)[0])
-    ends = drift.t_s[-1] >= window[1] - 1.0  # an estimate that ends in flight is none
+    ends = drift.t_s[-1] >= flight_s[1] - 1.0  # an estimate that ends in flight is none
     return Line(
         float(drift.horizontal_m[-1]) if ends else NEVER, float(drift.horizontal_m.max()), float(abs(np.rad2deg(turn)))
     )

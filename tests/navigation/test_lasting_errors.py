@@ -13,7 +13,7 @@ from flownav.estimation.states import ATTITUDE, FLOW_SCALE, INS_ERROR
 from flownav.navigation.feed import heading_source
 from flownav.navigation.heading import RECONSIDERED_S, weigh_heading
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT
-from flownav.navigation.records import HeadingMemory
+from flownav.navigation.records import GpsMemory, HeadingMemory
 from flownav.navigation.told import FROM_MAG, NO_HEADING
 from flownav.navigation.verdicts import Doubt, Fate, Noise
 from flownav.navigation.verdicts import Tested as Outcome
@@ -26,11 +26,13 @@ NONE = (Doubt(ATTITUDE + 2, 0.0), Doubt(INS_ERROR + 2, 0.0))
 
 
 # -- the gate of a heading -----------------------------------------------------------------------------------
-def weighed(innovation: float, m: HeadingMemory, t_s: float = 1.0, reason: int = FUSED):
+GONE, HOLDS = GpsMemory(), GpsMemory(told_s=1.0e9)
+
+
+def weighed(innovation: float, m: HeadingMemory, t_s: float = 1.0, reason: int = FUSED, gps: GpsMemory = GONE):
     """A heading of 100 Hz: fused with 72 degrees, one alone is known to 2.3."""
-    return weigh_heading.law(
-        Fate(reason), Outcome(reason, innovation, 2.0 * SIGMA**2, SIGMA**2), m, t_s=t_s, gate_sigma=GATE
-    )
+    tested = Outcome(reason, innovation, 2.0 * SIGMA**2, SIGMA**2)
+    return weigh_heading.law(Fate(reason), tested, gps, m, t_s=t_s, gate_sigma=GATE)
 
 
 def test_the_gate_of_a_heading_is_that_of_one_however_often_it_is_read():
@@ -38,6 +40,7 @@ def test_the_gate_of_a_heading_is_that_of_one_however_often_it_is_read():
     edge = GATE * math.sqrt(2.0) * SIGMA
     passes = weighed(0.99 * edge, m)
     assert (passes.fate, passes.noise, passes.doubts) == (Fate(FUSED), Noise(1.6), NONE)
+    assert (passes.heading.agreed_s, weighed(0.0, passes.heading, 2.0).heading.agreed_s) == (1.0, 1.0)
     refused = weighed(-1.01 * edge, m)
     assert (refused.fate, refused.heading.refused_s, refused.doubts) == (Fate(INNOVATION_GATE), 1.0, NONE)
     again = weighed(1.01 * edge, refused.heading, 2.0)
@@ -46,13 +49,27 @@ def test_the_gate_of_a_heading_is_that_of_one_however_often_it_is_read():
     assert weighed(9.0, again.heading, 3.0, SILENT).heading.refused_s == 1.0  # one that is not offered says nothing
 
 
-def test_headings_that_stay_refused_make_both_the_heading_and_their_own_error_doubted_by_the_contradiction():
-    m = HeadingMemory(fused_rad2=1.6, refused_s=1.0)
-    waits = weighed(1.0, m, 1.0 + 0.99 * RECONSIDERED_S)
-    assert waits.doubts == NONE
-    lasts = weighed(-1.2, m, 1.0 + 1.01 * RECONSIDERED_S)
-    assert lasts.doubts == (Doubt(ATTITUDE + 2, pytest.approx(1.44)), Doubt(INS_ERROR + 2, pytest.approx(1.44)))
+@pytest.mark.parametrize(("agreed_s", "after_s", "own"), [
+    (0.0, 3.0, 0.0),  # one wrong reading at the start is no witness against all that follow
+    (0.9, 3.0, 0.0),
+    (2.0, 6.0, 0.0),
+    (4.0, 12.0, 1.44),  # both agreed for a while: nothing tells which is wrong
+    (9.0, 27.0, 1.44),
+    (60.0, 30.0, 1.44),
+])  # fmt: skip
+def test_headings_that_are_refused_longer_than_they_agreed_make_what_they_taught_doubted(agreed_s, after_s, own):
+    m = HeadingMemory(fused_rad2=1.6, agreed_s=100.0 - agreed_s, refused_s=100.0)
+    assert weighed(-1.2, m, 100.0 + 0.99 * after_s).doubts == NONE
+    lasts = weighed(-1.2, m, 100.0 + 1.01 * after_s)
+    assert lasts.doubts == (Doubt(ATTITUDE + 2, pytest.approx(1.44)), Doubt(INS_ERROR + 2, pytest.approx(own)))
     assert math.isnan(lasts.heading.refused_s)  # what is doubted once is not doubted again at the next reading
+    assert math.isnan(lasts.heading.agreed_s)
+
+
+def test_where_gps_tells_the_heading_by_the_course_only_their_own_error_is_doubted():
+    m = HeadingMemory(fused_rad2=1.6, agreed_s=99.0, refused_s=100.0)
+    lasts = weighed(-1.2, m, 103.1, gps=HOLDS)
+    assert lasts.doubts == (Doubt(ATTITUDE + 2, 0.0), Doubt(INS_ERROR + 2, pytest.approx(1.44)))
 
 
 # -- a compass that is turned aside --------------------------------------------------------------------------
@@ -92,6 +109,19 @@ def test_a_field_that_stays_turned_is_followed_in_the_end_and_its_doubt_is_state
     found = navigate(turned_aside(flown, math.radians(60.0), 20.0, 1e9))
     assert np.abs(found.yaw_error[found.t_s < 20.0 + RECONSIDERED_S]).max() < math.radians(5.0)
     assert np.abs(found.yaw_error[-1]) < 3.0 * found.sigma(ATTITUDE + 2)
+
+
+@pytest.mark.parametrize("sensors", [INDOORS, OUTDOORS], ids=["indoors", "outdoors"])
+@pytest.mark.parametrize("wrong", [1, 5, 20])
+@pytest.mark.parametrize("angle_deg", [60.0, 90.0])
+def test_wrong_fields_at_the_start_are_unlearnt(sensors, wrong, angle_deg):
+    """Indoors 5 to 20 of them had left the heading 44 to 54 degrees off at 30 s, with 10 stated."""
+    flown = fly(circle, 40.0, yaw_rate=0.1).only(*sensors)
+    found = navigate(turned_aside(flown, math.radians(angle_deg), -1.0, 0.1 * wrong - 0.05))
+    late = found.t_s > 20.0
+    stated = found.said.std_tilt_ned_rad[late, 2]
+    assert (np.abs(found.yaw_error[late]) < 2.0 * stated).all()
+    assert np.abs(found.yaw_error[late]).max() < math.radians(16.0)
 
 
 def test_without_gps_a_compass_holds_the_heading_that_a_biased_gyro_loses():

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.core.compile import Lanes, Work, arctan2, equation, larger, procedure, replacing
+from flownav.core.compile import Lanes, Work, arctan2, clamp, equation, larger, procedure, replacing
 from flownav.core.frames import rotation_from_quaternion, to_earth
 from flownav.core.measurement import Sensor
 from flownav.estimation.covariance import expect, states_of
@@ -12,10 +12,11 @@ from flownav.estimation.hypotheses import HEADING_OFF, sign_all
 from flownav.estimation.laws.attitude import heading
 from flownav.estimation.named import Attitude
 from flownav.estimation.states import ATTITUDE, INS_ERROR
+from flownav.navigation.memory import holds
 from flownav.navigation.offers import conclude, offer_what_is_sound
 from flownav.navigation.packed import load_attitude_settings
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE, NO_HEADING, SILENT, is_heard, usable_in_flight
-from flownav.navigation.records import HeadingMemory, Reading, StartMemory
+from flownav.navigation.records import GpsMemory, HeadingMemory, Reading, StartMemory
 from flownav.navigation.tape import Output
 from flownav.navigation.told import FROM_YAW, AttitudeSettings, Equipment
 from flownav.navigation.verdicts import Doubt, Fate, Noise, Offer, Tested, on_lanes
@@ -23,9 +24,11 @@ from flownav.navigation.verdicts import Doubt, Fate, Noise, Offer, Tested, on_la
 LEAST_FIELD_GAUSS = 1e-3  # chosen: hundreds of times less than the level field but near the magnetic poles
 LEAST_STEP_S = 1e-3  # keeps a division finite
 
-RECONSIDERED_S = 30.0  # chosen: three times as long as a vehicle passes by steel
+# Headings that are refused for three times as long as they agreed before are as good as what the filter learnt of them,
+# within bounds: a moment, and three times as long as a vehicle passes by steel. All chosen.
+RECONSIDERED_TIMES, LEAST_RECONSIDERED_S, RECONSIDERED_S = 3.0, 3.0, 30.0
 with_time = replacing(HeadingMemory, "read_s", "fused_rad2")
-with_refusal = replacing(HeadingMemory, "refused_s")
+with_refusal = replacing(HeadingMemory, "agreed_s", "refused_s")
 with_field = replacing(HeadingMemory, "field_rad")
 
 
@@ -71,23 +74,32 @@ class Weighed(NamedTuple):
 
 
 @on_lanes
-def weigh_heading(fate: Fate, tested: Tested, m: HeadingMemory, *, t_s: float, gate_sigma: float) -> Weighed:
+def weigh_heading(
+    fate: Fate, tested: Tested, gps: GpsMemory, m: HeadingMemory, *, t_s: float, gate_sigma: float
+) -> Weighed:
     """The gate is that of one heading, however often it is read: an error that lasts lets none pass that is far off.
 
-    Headings that are refused for RECONSIDERED_S contradict the filter's heading and what is known of their own lasting
-    error; which of both is wrong they cannot tell, so both are doubted by the contradiction.
+    Headings that stay refused contradict what the filter learnt of those before, which may have been wrong as well.
+    Where GPS holds, it tells the heading by the course, and the headings' own lasting error is doubted by the
+    contradiction. Without it the filter's heading is doubted, and so is that error where headings had agreed for more
+    than a moment: which of them is wrong nothing tells then.
     """
     sound = fate.reason == FUSED
     beyond = sound and tested.innovation * tested.innovation > gate_sigma * gate_sigma * tested.total
     since_s = m.refused_s if np.isfinite(m.refused_s) else t_s
-    lasts = beyond and t_s - since_s >= RECONSIDERED_S
-    doubt = tested.innovation * tested.innovation if lasts else 0.0
-    refused_s = (np.nan if lasts else since_s) if beyond else (np.nan if sound else m.refused_s)
+    agreed_s = since_s - m.agreed_s if np.isfinite(m.agreed_s) else 0.0
+    lasts = beyond and t_s - since_s >= clamp(RECONSIDERED_TIMES * agreed_s, LEAST_RECONSIDERED_S, RECONSIDERED_S)
+    doubt, held = tested.innovation * tested.innovation if lasts else 0.0, holds(gps, t_s)
+    passes_s = t_s if sound and not beyond and not np.isfinite(m.agreed_s) else m.agreed_s
+    waits_s = since_s if beyond else (np.nan if sound else m.refused_s)
     return Weighed(
         Fate(INNOVATION_GATE if beyond else fate.reason),
         Noise(m.fused_rad2),
-        with_refusal(m, refused_s=refused_s),
-        (Doubt(ATTITUDE + 2, doubt), Doubt(INS_ERROR + 2, doubt)),
+        with_refusal(m, agreed_s=np.nan if lasts else passes_s, refused_s=np.nan if lasts else waits_s),
+        (
+            Doubt(ATTITUDE + 2, 0.0 if held else doubt),
+            Doubt(INS_ERROR + 2, doubt if held or agreed_s >= LEAST_RECONSIDERED_S else 0.0),
+        ),
     )
 
 

@@ -184,7 +184,8 @@ class HeadingMemory(NamedTuple):
     """read_s: when a heading was read last; field_rad: direction of the level magnetic field in the filter's frame;
     refuted: 1 once what is read as heading was found to be wrong; sought: 1 while a heading that no sensor reads is to
     be found from the course; fused_rad2: the variance with which the heading at hand is fused [rad2];
-    refused_s: since when headings are refused, NaN where the last one passed its gate.
+    agreed_s: since when headings passed their gate, NaN where none did; refused_s: since when they are refused, NaN
+    where the last one passed.
     """
 
     read_s: float = -inf
@@ -192,6 +193,7 @@ class HeadingMemory(NamedTuple):
     refuted: float = 0.0
     sought: float = 0.0
     fused_rad2: float = nan
+    agreed_s: float = nan
     refused_s: float = nan
 
 

@@ -88,3 +88,22 @@ def test_a_barometer_names_the_seconds_unless_it_has_drifted(tmp_path, drift_m, 
     assert not found.flags.any()
     if named:
         assert "of the height of the barometer" in found.said[0]
+
+
+def test_a_hover_that_a_truth_confirms_is_no_range_that_stands_still(tmp_path):
+    """Twenty seconds at 5.00 m within a millimetre, by a sensor of whole centimetres; one that sticks in a climb is."""
+    t_s = np.arange(0.0, 60.0, 0.05)
+    climbs = np.interp(t_s, [0.0, 10.0, 30.0, 50.0, 60.0], [1.0, 5.0, 5.0, 9.0, 9.0])
+    height = climbs + 1e-3 * np.sin(t_s)
+    log = read_csv_folder(written(tmp_path / "hover", duration_s=10.0))
+    level = np.tile([1.0, 0.0, 0.0, 0.0], (len(t_s), 1))
+    truth = {"t_s": t_s, "pos_n_m": 0.0 * t_s, "pos_e_m": 0.0 * t_s, "pos_d_m": -height}
+    stuck = np.where((t_s > 31.0) & (t_s < 49.0), 5.2, height)
+
+    def found(read):
+        streams = [Stream.of(Sensor.RANGE, t_s, np.round(read, 2)[:, None]), Stream.of(Sensor.ATTITUDE, t_s, level)]
+        alone = replace(log, streams={stream.sensor: stream for stream in streams}, truth=truth)
+        return untrue(alone, np.ones(len(t_s), bool))
+
+    assert found(height).said == ()
+    assert "it repeats 5.20 m" in found(stuck).said[0]

@@ -115,3 +115,59 @@ def test_without_a_climb_nothing_is_told_of_down():
     streams = {Sensor.BARO: Stream.of(Sensor.BARO, T_S, 0.01 * np.random.default_rng(1).normal(size=(len(T_S), 1)))}
     assert upside_down(still, streams) == ""
     assert upside_down(table(PATH), {}) == ""
+
+
+# -- what is no leap ---------------------------------------------------------------------------------------------
+def straight_on(speed_m_s: float, hz: float, noise_m: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """A minute at a constant velocity north, 2 m up."""
+    t_s = np.arange(0.0, 60.0, 1.0 / hz)
+    path = np.column_stack([speed_m_s * t_s, 0.0 * t_s, 0.0 * t_s - 2.0])
+    return t_s, path + np.random.default_rng(1).normal(0.0, 1.0, path.shape) * noise_m
+
+
+def held_for_3_s() -> tuple[np.ndarray, np.ndarray]:
+    """A tracker that loses its target tells the old place until it finds it again."""
+    t_s, path = straight_on(2.0, 50.0)
+    lost = (t_s > 20.0) & (t_s < 23.0)
+    path[lost] = path[lost][0]
+    return t_s, path
+
+
+def one_stamp_is_late() -> tuple[np.ndarray, np.ndarray]:
+    t_s, path = straight_on(6.0, 10.0)
+    t_s[300] += 0.095
+    return t_s, path
+
+
+def stamps_jitter() -> tuple[np.ndarray, np.ndarray]:
+    t_s, path = straight_on(20.0, 5.0)
+    return np.sort(t_s + np.random.default_rng(2).normal(0.0, 0.03, len(t_s))), path
+
+
+def a_spike_settles() -> tuple[np.ndarray, np.ndarray]:
+    t_s, path = straight_on(1.0, 50.0)
+    path[1000:1006, 0] += [1.0, 0.8, 0.6, 0.4, 0.2, 0.0]
+    return t_s, path
+
+
+@pytest.mark.parametrize("made", [
+    held_for_3_s, one_stamp_is_late, stamps_jitter, a_spike_settles, lambda: straight_on(1.0, 100.0, 0.08),
+    lambda: straight_on(1.0, 10.0, 0.5),
+])  # fmt: skip
+def test_a_truth_that_goes_on_where_it_was_going_is_never_shifted(made):
+    """Such truths had been moved by 0.6 to 9 m for all that follows."""
+    t_s, path = made()
+    table, notes = examined({"t_s": t_s} | dict(zip(POSITION_NED, path.T, strict=True)), "truth.csv")
+    rows = np.searchsorted(t_s, table["t_s"])
+    assert np.abs(np.column_stack([table[name] for name in POSITION_NED]) - path[rows]).max() == 0.0
+    assert not any("leaps by" in note for note in notes)
+
+
+def test_a_barometer_that_saw_the_climb_decides_before_a_range_over_a_slope():
+    t_s = np.arange(0.0, 60.0, 0.1)
+    up = 0.2 * t_s
+    truth = {"t_s": t_s, **dict(zip(POSITION_NED, (t_s, 0.0 * t_s, -up), strict=True))}
+    heights = {Sensor.BARO: 100.0 + up, Sensor.RANGE: 8.0 - 0.1 * t_s}
+    streams = {sensor: Stream.of(sensor, t_s, value[:, None]) for sensor, value in heights.items()}
+    assert upside_down(truth, streams) == ""
+    assert upside_down(truth, {Sensor.RANGE: streams[Sensor.RANGE]}) == "range"

@@ -168,7 +168,7 @@ def test_the_first_lines_say_whether_it_landed_where_how_sure_and_what_limited_i
     touchdown = record.manifest["scores"]["touchdown"]
     touchdown |= {"limited_by": {"estimate_m": 0.1, "guidance_m": 0.34, "pad_m": 0.0}}
     said = headline(record)
-    assert "landed 0.370 m from the pad's centre" in said
+    assert said.startswith("It touched 0.370 m from the pad's centre.")
     assert "within 0.090 m" in said  # three sigma of the less certain axis, east
     assert "The largest part of that distance is due to guidance (0.340 m)" in said
     assert said in render(record).replace("&#39;", "'")

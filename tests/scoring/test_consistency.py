@@ -283,3 +283,14 @@ def test_in_flight_is_what_the_landed_signal_says():
     assert aloft(t_s, said_s, np.array([1.0, 0.0, 1.0])).tolist() == [False, False, True, True, False, False]
     assert aloft(t_s, said_s, np.ones(3)).all()  # a signal that never says flight is no signal
     assert aloft(t_s, said_s[:0], said_s[:0]).all()
+
+
+def test_a_sensor_that_was_refused_throughout_is_judged_by_what_was_refused():
+    rows = {Sensor.GPS_POSITION: np.ones(50, bool)}
+    found = consistency_by_sensor(
+        lambda sensor: rows.get(sensor, np.zeros(50, bool)), np.zeros(50, bool), np.zeros(50), np.full(50, 9.0),
+        np.ones(50),
+    )  # fmt: skip
+    assert found["gps_position"]["refused"] == 1.0
+    assert found["gps_position"]["samples"] == 50
+    assert "100 % of it refused in flight" in verdict(found["gps_position"]["nis_per_dof"], white=True, refused=1.0)

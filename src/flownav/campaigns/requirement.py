@@ -122,7 +122,7 @@ class Conditions(ParameterModel):
     @classmethod
     def _blow(cls, ranges: dict[str, Distribution]) -> dict[str, Distribution]:
         wind = ranges.get(WIND)
-        if wind is not None and wind.distribution == "uniform" and wind.frozen().support()[0] < 0.0:
+        if wind is not None and wind.frozen().support()[0] < 0.0:
             raise ValueError(f"{WIND}: a wind's speed begins at 0; where it comes from is wind.from_direction_deg")
         return ranges
 

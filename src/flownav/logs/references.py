@@ -17,9 +17,10 @@ from flownav.core.record import POSITION_NED, Table
 
 FARTHEST_M = 1e5  # from a local origin
 LEAST_LEAP_M, LEAST_LEAP_M_S = 0.5, 20.0  # more than its own motion makes it, and that much per time
-LEAST_PIECE_S = 1.0  # what is shorter is a stray
+LEAST_PIECE_S = 1.0  # what is shorter is a stray; over as long the path before and after a leap must stay apart
 STEPS = 5  # whose median is the motion before a leap
 MOST_STRAYS = 0.2  # of the rows; with more nothing is known of which are right
+LEAST_SCATTERS = 6.0  # of the path about its motion, that a leap is longer than
 LEAST_MOVE_M, LEAST_ROWS = 1.0, 10  # of an origin; rows before and after
 LEAST_HEIGHTS, LEAST_CLIMB_M, LEAST_LIKENESS = 50, 0.3, 0.9  # readings; rms; correlation that shows up from down
 SHOWN = 3
@@ -41,8 +42,8 @@ def upside_down(truth: Table, streams: Mapping[Sensor, Stream]) -> str:
         ours, theirs = np.interp(at_s[inside], t_s, up_m), height_m[inside]
         if min(ours.std(), theirs.std()) < LEAST_CLIMB_M:
             continue
-        if float(np.corrcoef(ours, theirs)[0, 1]) < -LEAST_LIKENESS:
-            return sensor.name.lower()
+        # a barometer that saw the climb decides: a range over a slope falls as its vehicle climbs
+        return sensor.name.lower() if float(np.corrcoef(ours, theirs)[0, 1]) < -LEAST_LIKENESS else ""
     return ""
 
 
@@ -66,7 +67,7 @@ def examined(truth: Table, name: str) -> tuple[Table, tuple[str, ...]]:
     if len(strays) > MOST_STRAYS * len(t_s):
         return truth, (f"{name} leaps about ({len(strays)} of its {len(t_s)} rows): errors against it mean little",)
     table: Table = truth if not len(strays) else {key: np.asarray(column)[kept] for key, column in truth.items()}
-    leaps = leaps_of(t_s[kept], position[kept])
+    leaps = lasting(leaps_of(t_s[kept], position[kept]), t_s[kept], position[kept])
     for leap in leaps:
         later = np.asarray(table["t_s"], float) >= leap.t_s
         table = table | {
@@ -97,6 +98,61 @@ def leaps_of(t_s: Array, position: Array) -> list[Leap]:
         if size >= LEAST_LEAP_M and size >= LEAST_LEAP_M_S * step_s[place]:
             found.append(Leap(float(at[place + 1]), beyond))
     return found
+
+
+def lasting(leaps: Sequence[Leap], t_s: Array, position: Array) -> list[Leap]:
+    """Those leaps after which a path (n,), (n, 3) stays apart from where it was going.
+
+    The path of a second before, and of one after, are each carried to the leap by their median velocity. A row with a
+    late stamp, a spike that settles, or noise leaves the two together. Where a place was told for more than a second
+    before, the vehicle stood there, or its tracker had lost it: a way that either velocity makes meanwhile is no leap.
+    """
+    new = np.flatnonzero(np.concatenate([[True], (np.diff(position, axis=0) != 0.0).any(axis=1)]))
+    at_s, path = t_s[new], position[new]
+    usual_s = float(np.median(np.diff(at_s))) if len(at_s) > 1 else 0.0
+    found = []
+    for leap in leaps:
+        place = int(np.searchsorted(at_s, leap.t_s))
+        early = slice(int(np.searchsorted(at_s, at_s[place - 1] - LEAST_PIECE_S)), place)
+        late = slice(place, int(np.searchsorted(at_s, leap.t_s + LEAST_PIECE_S, side="right")))
+        pieces = [_Piece.of(at_s[part], path[part]) for part in (early, late)]
+        held_s, size_m = float(at_s[place] - at_s[place - 1]), float(np.linalg.norm(leap.by_ned_m))
+        if held_s > LEAST_PIECE_S:
+            step = path[place] - path[place - 1]
+            left_m = [float(np.linalg.norm(step - piece.motion * held_s)) for piece in pieces]
+            stays = min(left_m) >= 0.5 * float(np.linalg.norm(step))
+        else:
+            middle_s = float(at_s[place] - 0.5 * held_s)
+            apart = pieces[1].at(middle_s) - pieces[0].at(middle_s)
+            scatter_m = max(piece.scatter_m for piece in pieces)
+            stamped_m = usual_s * max(float(np.linalg.norm(piece.motion)) for piece in pieces)  # by a stamp that is off
+            least_m = max(LEAST_SCATTERS * scatter_m, stamped_m)
+            stays = float(apart @ leap.by_ned_m) >= 0.5 * size_m**2 and size_m >= least_m
+        if stays:
+            found.append(leap)
+    return found
+
+
+class _Piece(NamedTuple):
+    """A second of a path: its median velocity [m/s], where that has it at an instant [m], and its scatter [m]."""
+
+    t_s: float
+    place: Array
+    motion: Array
+    scatter_m: float
+
+    @classmethod
+    def of(cls, t_s: Array, path: Array) -> "_Piece":
+        """By rows (n,), (n, 3)."""
+        speed = np.diff(path, axis=0) / np.maximum(np.diff(t_s), 1e-6)[:, None]
+        motion = np.median(speed, axis=0) if len(speed) else np.zeros(3)
+        there = path - motion * (t_s - t_s[0])[:, None]
+        place = np.median(there, axis=0)
+        return cls(float(t_s[0]), place, motion, float(np.median(np.linalg.norm(there - place, axis=1))))
+
+    def at(self, t_s: float) -> Array:
+        """Where it is at an instant."""
+        return np.asarray(self.place + self.motion * (t_s - self.t_s))
 
 
 def of_one_origin(t_s: Array, local: Array, known_t_s: Array, known: Array) -> tuple[Array, list[Leap]]:

@@ -32,11 +32,17 @@ def topic_files(folder: Path, topics: tuple[str, ...]) -> list[TopicFile]:
     """The files of the topics, in order of topic and instance. InputError where they are of several logs."""
     found = [file for path in sorted(folder.glob("*.csv")) if (file := _file(path, topics))]
     logs = {file.log for file in found}
-    logs = {log for log in logs if not any(log != other and log.startswith(f"{other}_") for other in logs)}
+    brought = {log: {file.topic for file in found if file.log == log and file.topic in CARRIERS} for log in logs}
+    # a topic that is not known may end in one that is: its log would be the other's with a word more, and bring little
+    logs = {log for log in logs if not any(_lengthens(log, other) for other in logs) or len(brought[log]) > 1}
     if len(logs) > 1:
         first, second, *_ = sorted(logs)
         raise InputError(f"{folder}: files of several logs ({first}, {second}); give each a folder of its own")
     return sorted((file for file in found if file.log in logs), key=lambda file: (file.topic, file.instance))
+
+
+def _lengthens(log: str, other: str) -> bool:
+    return log != other and log.startswith(f"{other}_")
 
 
 def _file(path: Path, topics: tuple[str, ...]) -> TopicFile | None:

@@ -88,7 +88,7 @@ def followed_blocks(reading: Reading, t_s: float, m: ForceBlocks) -> ForceBlocks
     square = squared(change_x - m.change_x) + squared(change_y - m.change_y)
     share = larger(1.0 / (m.blocks - 1.0), BLOCK_S / BLOCKS_FOLLOWED_S) if m.blocks > 1.0 else 0.0
     ended = ForceBlocks(
-        0.0, 0.0, 0.0, 0.0, x, y, change_x if m.blocks > 0.0 else 0.0, change_y if m.blocks > 0.0 else 0.0,
+        0.0, 0.0, 0.0, 0.0, x, y, change_x, change_y,
         m.blocks + 1.0, m.power + share * (square * BLOCK_S / 12.0 - m.power),
     )  # fmt: skip
     anew = ForceBlocks(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, m.power)

@@ -131,12 +131,13 @@ def consistency_by_sensor(
     """The consistency of each sensor that has fused components, by its name.
 
     rows_of: which rows of the tested components are a sensor's; fused (n,): which of them lay inside the gate. What
-    was refused was not believed: it tells of the sensor, by its share, and not of what the filter states.
+    was refused was not believed: it tells of the sensor, by its share, and not of what the filter states. Of a sensor
+    that was refused throughout all count, so that it is judged at all.
     """
     found = {}
     for sensor in Sensor:
         rows = rows_of(sensor)
-        kept = rows & fused
+        kept = rows & fused if (rows & fused).any() else rows
         judged = consistency_of(component[kept], innovation[kept], variance[kept])
         if judged is not None:
             refused = float(np.count_nonzero(rows & ~fused) / np.count_nonzero(rows))

@@ -25,12 +25,13 @@ def sentence(manifest: Mapping[str, Any], scores: Mapping[str, Any]) -> str:
     manifest: of a record; scores: of the flight, or of many flights beside it, as `flownav fly --json` has them.
     """
     landing = mapping(scores.get("touchdown"))
-    how = _many(landing, scores) if isinstance(landing.get("success"), Mapping) else _one(landing)
+    many = isinstance(landing.get("success"), Mapping)
+    how = _many(landing, scores) if many else _one(landing)
     errors = "; ".join(_errors(scores))
     if not how and not errors:
         return ""
     how = how or "Flew"
-    return f"{how}{_wind(manifest)}{f'. Navigation error in flight: {errors}' if errors else ''}."
+    return f"{how}{_wind(manifest, drawn=not many)}{f'. Navigation error in flight: {errors}' if errors else ''}."
 
 
 def _one(landing: Mapping[str, Any]) -> str:
@@ -59,10 +60,12 @@ def _many(landing: Mapping[str, Any], scores: Mapping[str, Any]) -> str:
     return f"{landed} of {flights} flights landed{within}"
 
 
-def _wind(manifest: Mapping[str, Any]) -> str:
-    """The wind of a scenario, as words to follow."""
-    scenario = mapping(mapping(manifest.get("parameters")).get("scenario"))
-    speed = mapping(scenario.get("wind")).get("speed_20ft_m_s")
+def _wind(manifest: Mapping[str, Any], *, drawn: bool) -> str:
+    """The wind of the scenario, or of one flight as it was drawn, as words to follow."""
+    parameters = mapping(manifest.get("parameters"))
+    stated = mapping(mapping(parameters.get("scenario")).get("wind")).get("speed_20ft_m_s")
+    own = mapping(parameters.get("drawn")) if drawn else {}
+    speed = own.get("wind.speed_20ft_m_s", stated)
     return f" in {speed:g} m/s of wind" if speed else " in calm air" if speed == 0.0 else ""
 
 

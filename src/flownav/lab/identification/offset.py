@@ -57,6 +57,8 @@ def flow_offset(flown: Flight, moved: Motion, velocity: Array, response: Array, 
     seen = velocity[far] / range_m
     design = np.column_stack([body, np.ones(len(body))])
     solution = np.linalg.lstsq(design, seen, rcond=None)[0]
+    if np.linalg.matrix_rank(design) < design.shape[1]:
+        return None  # it never moved along one axis, or by nothing but one velocity
     inverse, wander = np.linalg.inv(design.T @ design), _wander(flown, t_s, range_m)
     few = (labels.max() + 1) / (labels.max() - 2)
     found = []

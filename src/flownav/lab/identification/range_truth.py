@@ -24,8 +24,10 @@ BACK_M = 1.5  # of the range at landing: a barometer further off has drifted
 # from which on a witness contradicts: metres, and share of the height. A barometer stands in the rotors' wash
 WITNESSES = {"truth": (0.5, 0.3), "baro": (3.0, 0.5)}
 LEAST_ROWS = 50
+KEPT_M = 0.05  # up and down, by a truth of a vehicle that keeps its height: chosen
 
 Flags = NDArray[np.bool_]
+Witness = tuple[str, str, Array, Array]  # its kind, its name, its instants and heights
 
 
 class Untrue(NamedTuple):
@@ -43,7 +45,7 @@ def untrue(log: Log, flying: Flags) -> Untrue:
     flags, said = np.zeros(len(t_s), bool), []
     if len(rows) < LEAST_ROWS:
         return Untrue(flags, ())
-    found = [_repeated(t_s[rows], range_m[rows])]
+    found = [_repeated(t_s[rows], range_m[rows], _height(log))]
     left = rows[~found[0].flags]
     flags[rows[found[0].flags]] = True
     if len(left) >= LEAST_ROWS:
@@ -54,11 +56,13 @@ def untrue(log: Log, flying: Flags) -> Untrue:
     return Untrue(flags, tuple(said))
 
 
-def _repeated(t_s: Array, range_m: Array) -> Untrue:
-    """One value to the last digit, but the lowest, for far longer than every other."""
+def _repeated(t_s: Array, range_m: Array, witness: Witness | None = None) -> Untrue:
+    """One value to the last digit, but the lowest, for far longer than every other; not while a truth keeps its height
+    as well, as in a steady hover.
+    """
     edges = np.flatnonzero((np.diff(range_m) != 0.0) | (np.diff(t_s) > BROKEN_S)) + 1
     runs = list(pairwise([0, *edges.tolist(), len(t_s)]))
-    lasts = np.array([t_s[b - 1] - t_s[a] for a, b in runs])
+    lasts = np.array([0.0 if _keeps(witness, t_s[a], t_s[b - 1]) else t_s[b - 1] - t_s[a] for a, b in runs])
     value = range_m[runs[int(np.argmax(lasts))][0]]
     others = [last for last, (a, _) in zip(lasts, runs, strict=True) if range_m[a] != value]
     usual = float(np.max(others, initial=0.0))
@@ -118,7 +122,7 @@ def _away(log: Log, t_s: Array, range_m: Array) -> Untrue:
     return Untrue(used, (f"{said} for {seconds:.0f} s, or the ground is another there",))
 
 
-def _height(log: Log) -> tuple[str, str, Array, Array] | None:
+def _height(log: Log) -> Witness | None:
     """The best witness: its kind, its name, its instants and heights."""
     if log.truth is not None and "pos_d_m" in log.truth:
         return "truth", log.truth_name, np.asarray(log.truth["t_s"], float), -np.asarray(log.truth["pos_d_m"], float)
@@ -126,6 +130,14 @@ def _height(log: Log) -> tuple[str, str, Array, Array] | None:
     if baro is None or len(baro) < LEAST_ROWS:
         return None
     return "baro", "the barometer", baro.t_s - baro.delay_s, baro.value[:, 0]
+
+
+def _keeps(witness: Witness | None, start_s: float, end_s: float) -> bool:
+    """Whether a truth tells of one height from a start to an end; a barometer is too noisy to."""
+    if witness is None or witness[0] != "truth":
+        return False
+    inside = (witness[2] >= start_s) & (witness[2] <= end_s)
+    return bool(inside.any()) and _span(witness[3], inside) < KEPT_M
 
 
 def _span(values: Array, flags: Flags) -> float:

@@ -141,13 +141,14 @@ export function innovationScores(innovations, landed, SENSOR, REASON) {
   const rejected = {}, tested = {};
   for (const row of innovations) {
     const name = names[row.sensor], leftOut = mayLeaveOut.has(row.sensor) && row.component === 2 && Number.isNaN(row.observation);
-    if (row.reason === REASON.FUSED && flies(row.t_s)) (tested[name] ??= []).push(row);
+    if ((row.reason === REASON.FUSED || row.reason === REASON.INNOVATION_GATE) && flies(row.t_s)) (tested[name] ??= []).push(row);
     if (row.reason === REASON.FUSED || row.reason === REASON.DATUM) continue;
     if (leftOut && row.reason === REASON.NOT_FINITE && beside.has(`${row.sensor} ${row.t_s}`)) continue;
     const counts = (rejected[name] ??= {});
     counts[labels[row.reason]] = (counts[labels[row.reason]] ?? 0) + 1;
   }
-  const consistency = Object.fromEntries(Object.entries(tested).map(([name, rows]) => [name, {
+  const believed = (rows) => { const fused = rows.filter((row) => row.reason === REASON.FUSED); return fused.length ? fused : rows; };
+  const consistency = Object.fromEntries(Object.entries(tested).map(([name, every]) => [name, believed(every)]).map(([name, rows]) => [name, {
     nis_per_dof: mean(rows.map((row) => (row.innovation * row.innovation) / row.innovation_variance)), samples: rows.length,
   }]));
   return { rejected, consistency };

@@ -105,7 +105,10 @@ def navigated(seed: int = 1) -> Record:
     flown["pos_e_m"] = flown["pos_e_m"] + np.where(truth["t_s"] > 15.0, 1.0, 0.0)  # as a pad is found
     attitude = {name: truth[name] for name in ("qw", "qx", "qy", "qz")}
     record.add("flown", {"t_s": truth["t_s"], **flown, **attitude})
-    record.manifest |= {"filter": "landing", "known_exactly": "where it hovers for its first 5 s, flown on the truth"}
+    record.manifest |= {
+        "filter": "landing",
+        "known_exactly": "its position in hover for the first 5 s (true state used)",
+    }
     return record
 
 

@@ -313,7 +313,7 @@ def test_a_sensor_that_was_heard_and_hardly_fused_is_a_bad_verdict_of_the_replay
     run = replayed(path)
     said = [finding.text for finding in run.findings if finding.unfused]
     assert len(said) == 2
-    assert said[0].startswith("gps_position was heard and hardly fused (")
+    assert said[0].startswith("gps_position was received and hardly fused (")
     result = typed("replay", path, "--out", tmp_path / "again.fnr", "--report")
     assert result.returncode == 1
     assert "hardly fused" in result.stderr

@@ -97,7 +97,7 @@ def rank(entries: Mapping[str, Distribution], seed: int, n: int, fly: Fly) -> Ra
 
 
 def flights_of(inputs: int, n: int) -> int:
-    """How many flights `rank` flies for so many dispersed inputs."""
+    """The number of flights that `rank` flies for `inputs` dispersed inputs."""
     return n * (2 + inputs + 1 + len(CLASSES))
 
 

@@ -16,7 +16,7 @@ WITHOUT = "Leave parts out: less code."
 HORIZON = "How far behind the newest reading an instant is when it is fused [s]."
 IMU, OTHERS = "Inertial readings a second that there is room for.", "Readings of other sensors a second."
 CPU, FEATURES = "With a triple: the CPU, as LLVM calls it.", "With a triple: its features, as LLVM has them."
-WHAT = "What a board says: 16 digits, a file of lines (readings, digits), or a folder of `flownav build`."
+WHAT = "A board's answer: 16 digits, a file of lines (readings, digits), or a folder of `flownav build`."
 FLIGHTS = "those of the flight"
 FLOWN = "the scenario pad_return, flown here"
 
@@ -56,7 +56,7 @@ def command(
 
 
 def _show(place: Path, facts: dict[str, Any]) -> None:
-    """What was written, in words."""
+    """Print the build's place and sizes."""
     typer.echo(f"Written: {place}, build {facts['build']}")
     typer.echo(
         f"Code {facts['code_bytes'] / 1000:.1f} kB, constants {facts['constant_bytes'] / 1000:.1f} kB, settings "

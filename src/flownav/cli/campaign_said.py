@@ -1,4 +1,4 @@
-"""What a campaign says: its progress on standard error, a row a cell, the worst flights, and a rare event."""
+"""The output of a campaign: its progress on standard error, a row a cell, the worst flights, and a rare event."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ WIDE = 150  # columns of the tables
 FILE = "a requirement's FILE.toml"
 RANKING = "Rows of the ranking of inputs, a power of 2, for each input; 0: none."
 FLIGHTS = "as many as the requirement needs"
-AGAIN = "Fly so many of the flights again, drawn at random; they must be the same to the bit."
+AGAIN = "Fly this number of flights again, drawn at random; they must be the same to the bit."
 SIGN = "Sign the certificate with this Ed25519 key (PEM or OpenSSH); extra `sign`."
 VERIFY = "Look a certificate's folder through: files, rows, figures, flights."
 KEY = "With --verify: the signer's public key."
@@ -44,7 +44,7 @@ JUDGED = (
 
 Requirements = Annotated[
     str | None,
-    argument("REQUIREMENT", "What to show", *options.REQUIREMENTS, beside=FILE, default="none with --verify"),
+    argument("REQUIREMENT", "The requirement", *options.REQUIREMENTS, beside=FILE, default="none with --verify"),
 ]
 
 
@@ -107,7 +107,7 @@ def command(
 
 
 class How(NamedTuple):
-    """What flies; rows of the ranking; records; flights that are flown again; the key that signs."""
+    """The engine; rows of the ranking; records; flights that are flown again; the key that signs."""
 
     engine: Engine
     ranking: int

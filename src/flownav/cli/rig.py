@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 HEIGHTS_M = ["0.6"]
 HEIGHT = "Sensor's height above the pad at rest [m], repeated or with commas."
 EXCITATION = "How it is swung; swing is the paper's."
-PAD = "What it looks at; MM is the stripes' width."
+PAD = "The target; MM is the stripes' width."
 FOLDER = "The folder, with a folder in it for each of several runs"
 COLUMNS = (
     Column("folder", "folder"),
@@ -86,7 +86,7 @@ def _swung(settings: RigSettings, heights_m: list[float], folder: Path) -> list[
 
 
 def _facts(log: RigLog, folder: Path) -> dict[str, Any]:
-    """What a run was and what it looks like."""
+    """The facts of a run: its folder, geometry and peak velocity."""
     import numpy as np
 
     return {

@@ -1,9 +1,10 @@
-"""A position that no GPS holds is about a place; where it was lost, that place is said anew, as a jump that is counted.
+"""The place that a position without GPS refers to; where that place was lost it is set again, as a counted jump.
 
-Dead reckoning by flow has no truth to come back to: after a spell in which the flow could not be believed, how far the
-vehicle went meanwhile is not known, and waiting does not tell it. While the spell lasts the velocity alone is sent.
-Once flow and inertial sensors have agreed again for AGREED_S, what is sent goes on from where the filter believes it
-is: the limits are then of what has been added since, and the autopilot, told by the counter, goes there.
+Dead reckoning by flow has no truth to return to: after a period in which flow was not trusted, the distance covered
+meanwhile is unknown, and waiting does not reveal it. During the period only the velocity is sent. Once flow and
+inertial sensors have agreed again for AGREED_S, sending continues from where the filter believes the vehicle is: the
+limits then apply to the error added since, and the autopilot, which sees the reset counter change, moves its estimate
+there.
 """
 
 import math
@@ -24,8 +25,8 @@ PLACES = ("flow_doubted", "fault_suspected", "unprotected", "uncertain")  # reas
 
 
 class Base(NamedTuple):
-    """What is known to be wrong with a place and is not counted any more: its protection level [m], its variance [m2],
-    and the suspicion that belongs to it, by its beginning [s].
+    """Known errors of a place that are no longer counted: its protection level [m], its variance [m2], and the
+    suspicion that belongs to it, by its start time [s].
     """
 
     protection_m: float = 0.0
@@ -37,7 +38,7 @@ NOTHING = Base()
 
 
 class Anchor:
-    """The place that what is sent is about. moves: how often it was said anew."""
+    """The place that the sent position refers to. moves: number of times it was set again."""
 
     def __init__(self) -> None:
         self.base = NOTHING
@@ -50,7 +51,7 @@ class Anchor:
         self._agreed_s = self._doubted_s = math.nan
 
     def watch(self, on: Running, t_s: float) -> None:
-        """What the navigator says by now."""
+        """Update from the navigator's state at `t_s`."""
         flow = load_flow(on.work, ONE_LANE, 0)
         if flow.doubted > 0.0 or not on.clock_s <= flow.taken_s + FLOW_S:
             self._agreed_s = math.nan
@@ -68,7 +69,7 @@ class Anchor:
         return t_s - self._agreed_s >= AGREED_S
 
     def may_move(self, on: Running, t_s: float) -> bool:
-        """Whether the place may be said anew: nothing else holds it, and flow has been good for long enough."""
+        """Whether the place may be set again: nothing else holds it, and flow has been good for long enough."""
         if holds(on) or not self.agrees(t_s):
             return False
         suspicion = load_suspicion(on.work, ONE_LANE, 0)
@@ -87,7 +88,7 @@ class Anchor:
 
 
 def holds(on: Running) -> bool:
-    """Whether GPS has told the position lately."""
+    """Whether GPS has given the position within UNHELD_S."""
     return bool(on.clock_s <= load_gps(on.work, ONE_LANE, 0).told_s + UNHELD_S)
 
 

@@ -75,7 +75,7 @@ class Hearing:
 
     @property
     def dropped(self) -> Counter[str]:
-        """What was dropped, by sensor and reason."""
+        """Number of dropped readings by sensor and reason."""
         other = {f"{sensor.name.lower()}: other source": n for sensor, n in self.sources.dropped.items()}
         return self.counts + Counter(other)
 
@@ -88,7 +88,7 @@ class Hearing:
         now_s: float,
         here_ned_m: Vector | None = None,
     ) -> str:
-        """What a message measures, onto the rings. here_ned_m: where a running navigator is, if any.
+        """Put a message's measurements onto the rings. here_ned_m: where a running navigator is, if any.
         Returns `clock_jump` where the autopilot began anew."""
         sender = sender_of(message)
         by_autopilot = sender == vehicle[:2]
@@ -149,7 +149,9 @@ class Hearing:
             self.sources.first.pop(Sensor.IMU, None)
 
     def _compare(self, source: Source, reading: Measurement, now_s: float) -> None:
-        """An inertial reading beside the others'. What a wrong one said is taken back, another's put in its place."""
+        """Compare an inertial reading with the other sources'. Readings of a faulty source are taken back and another
+        source's are put in their place.
+        """
         barred = self.sources.barred.get(Sensor.IMU, set())
         swap = self.inertial.heard(source, reading, self.sources.chosen(Sensor.IMU), barred)
         alone = not self.sources.alive(Sensor.IMU, reading.t_s)

@@ -2,7 +2,7 @@
 
 Of each kind of sensor one source serves, the preferred message that is alive. Readings wait until everything of their
 instant must have arrived, as long as the slowest stream runs behind the newest reading, then go on in its order. A
-sensor that is heard and does not serve is an alarm, since what is sent then rests on less than the vehicle has.
+sensor that is received and not used is an alarm, since the estimate then rests on less than the vehicle has.
 """
 
 from collections import Counter, deque
@@ -19,12 +19,12 @@ SILENT_S = 2.0  # a source that says nothing for so long gives way
 # Chosen, and held by test_live_recordings: ArduPilot repeats a fix of 5 Hz at 10 Hz, its first copy up to 0.1 s old;
 # with a horizon that did not follow it, all fixes came too late on most starts.
 WINDOW_S = 5.0
-PATIENT_WINDOWS = 4  # a stream that comes in time again is waited for so many windows longer
+PATIENT_WINDOWS = 4  # a stream that comes in time again is waited for this number of windows longer
 WATCHED = (*HORIZONTAL, Sensor.RANGE, Sensor.LANDED)
 DOWNWARD = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.RANGE)  # on the ground they need not serve
 LATE = Reason.LATE.label
 LEAST_READINGS = 10  # chosen: 2 s of a 5 Hz receiver
-GONE_S = 2.0  # a sensor that has said nothing for so long is silent, which the screen shows otherwise: chosen
+GONE_S = 2.0  # a sensor without a message for this long is silent, which the screen shows otherwise: chosen
 
 
 class Source(NamedTuple):
@@ -137,7 +137,7 @@ class Lags:
         }
 
     def horizon_s(self, least_s: float, margin_s: float, most_s: float) -> float:
-        """What to wait: the greatest lag and a margin, at least `least_s` and at most `most_s`."""
+        """The time to wait [s]: the greatest lag and a margin, at least `least_s` and at most `most_s`."""
         return min(max(least_s, max(self.by_sensor.values(), default=0.0) + margin_s), most_s)
 
 
@@ -151,7 +151,7 @@ class Refused(NamedTuple):
 
 
 class Serving:
-    """Spells of readings that were heard and not fused, by sensor, on the vehicle's clock."""
+    """Periods in which readings were received and not fused, by sensor, on the vehicle's clock."""
 
     def __init__(self) -> None:
         self._spells: dict[Sensor, Refused] = {}
@@ -167,7 +167,7 @@ class Serving:
         self._spells[sensor] = Refused(before.since_s, max(t_s, before.until_s), before.readings + 1, why)
 
     def judged(self, offered: Iterable[InnovationRow[float]]) -> None:
-        """What became of readings in the navigator."""
+        """Update the periods from the navigator's verdicts on readings."""
         for row in offered:
             sensor, component, reason = Sensor(int(row.sensor)), int(row.component), int(row.reason)
             if sensor == Sensor.LANDED:
@@ -178,7 +178,7 @@ class Serving:
                 self.refused(sensor, row.t_s, Reason(reason).label)
 
     def landed(self, on_ground: bool) -> None:
-        """What the autopilot says of the ground; the navigator may deny it (`judged`)."""
+        """Take the autopilot's landed state; the navigator may contradict it (`judged`)."""
         self._landed = on_ground
         if on_ground and not self._denied:
             for sensor in DOWNWARD:

@@ -26,17 +26,17 @@ STUCK_S = 0.06  # chosen: six readings of a stream of 100 Hz; twelve of ArduPilo
 LEAST_STUCK = 5  # readings alike: chosen
 KEPT_S = 1.0  # of those that do not serve: chosen, more than the horizon and what finds it
 APART_M_S2 = 1.5  # medians that differ by more contradict each other: chosen, beyond two calibrated sensors' biases
-FLICKER_M_S2 = 0.1  # of a stuck one: chosen, ten of the thousandths of g that are told
+FLICKER_M_S2 = 0.1  # of a stuck one: chosen, ten of the thousandths of g in which readings are sent
 SURE = 4.0  # of the difference by chance: chosen
 LOOK_S = 0.1  # of what is compared: chosen
 LEAST_COMPARED, MOST_COMPARED = 3, 50  # readings of it; the most is chosen: 500 Hz, and a flood costs no more than that
 MOST_KEPT = 1024  # readings of a source: chosen, a second of 1 kHz
-BEFORE_S = 0.15  # what was said so shortly before is wrong too: an autopilot smooths what it reads; chosen
+BEFORE_S = 0.15  # readings shortly before that are wrong too: an autopilot smooths its readings; chosen
 RECOVERED_S = 0.3  # since it erred last, where none serves: chosen
 AGREED_S = 1.0  # likewise, where another serves: chosen
 HIGHER_M = 0.4  # a height that says so much more or less than expected, or is refused, is a witness: chosen
 TOGETHER_S = 0.5  # two that say so within this are of one mind: chosen
-DOUBTED_S = 1.0  # for so long after they said it: chosen
+DOUBTED_S = 1.0  # for this long after they reported it: chosen
 UP = {(Sensor.RANGE, 0): 1.0, (Sensor.BARO, 0): 1.0, (Sensor.GPS_POSITION, 2): -1.0}  # sign of an innovation, up
 
 
@@ -48,8 +48,8 @@ class Sample(NamedTuple):
 
 
 class Usual(NamedTuple):
-    """Medians of what an accelerometer said lately [m/s2], which a jolt that one stream has caught and another has
-    missed does not move, and by how much they differ by chance where it is shaken.
+    """Medians of an accelerometer's recent readings [m/s2], which a jolt that one stream has caught and another has
+    missed does not move, and by how much they differ by chance under vibration.
     """
 
     force: tuple[float, float, float]
@@ -57,7 +57,7 @@ class Usual(NamedTuple):
 
 
 class _Heard:
-    """What one source said lately, and since when its accelerometer says the same."""
+    """The recent readings of one source, and since when its accelerometer has repeated one value."""
 
     def __init__(self) -> None:
         self.kept: deque[Sample] = deque(maxlen=MOST_KEPT)
@@ -102,7 +102,7 @@ class _Heard:
         return self.jumped and self.gyro_moved and self.alike >= LEAST_STUCK and newest_s - self.same_since_s >= STUCK_S
 
     def usual(self, t_s: float) -> Usual | None:
-        """Over the LOOK_S before an instant; None where it has not said enough."""
+        """Medians over the LOOK_S before an instant; None where there are too few readings."""
         lately: list[tuple[float, ...]] = []
         for sample in reversed(self.kept):
             if t_s - sample.t_s > LOOK_S or len(lately) == MOST_COMPARED:
@@ -123,7 +123,7 @@ def _variance(values: tuple[float, ...]) -> float:
 
 
 class Swap(NamedTuple):
-    """A source that must not serve any more, from when on its readings are wrong, and what another said since."""
+    """A source that must no longer be used, since when its readings are wrong, and another's readings since then."""
 
     barred: Source
     since_s: float
@@ -132,7 +132,7 @@ class Swap(NamedTuple):
 
 
 class Inertial:
-    """The inertial sensors of a vehicle, heard beside each other."""
+    """The inertial sensors of a vehicle, compared with each other."""
 
     def __init__(self) -> None:
         self._heard: dict[Source, _Heard] = {}
@@ -163,7 +163,7 @@ class Inertial:
         return None
 
     def _swap(self, serves: Source, since_s: float, why: str, barred: Collection[Source]) -> Swap:
-        """Another in its place: what the first of the others said since."""
+        """The replacement of a source: the readings since `since_s` of the first other source that is alive."""
         alive = self._alive(serves, self._heard[serves].kept[-1].t_s, barred)
         return Swap(
             serves, since_s, why, [sample for sample in alive[0].kept if sample.t_s >= since_s] if alive else []
@@ -220,7 +220,7 @@ class Heights:
         self._doubted_s = math.nan
 
     def judged(self, rows: Iterable[InnovationRow[float]]) -> None:
-        """What became of readings in the navigator."""
+        """Take the navigator's verdicts on readings."""
         for row in rows:
             sign = UP.get((Sensor(int(row.sensor)), int(row.component)))
             reason = int(row.reason)

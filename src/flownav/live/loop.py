@@ -59,7 +59,7 @@ def run_before_others() -> str:
 
 
 def run_as_others() -> None:
-    """What follows the flight must not hold up the rest of the machine."""
+    """Run this thread at normal priority, so that work after the flight does not hold up the rest of the machine."""
     with suppress(OSError):
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 

@@ -1,4 +1,4 @@
-"""What of the estimate of now may be sent: alarms of sensors that do not serve, limits, and what contradicts it."""
+"""Decides whether the current estimate may be sent: alarms of unused sensors, limits, and contradictions."""
 
 from flownav.core.frames import Vector
 from flownav.core.measurement import Sensor
@@ -17,7 +17,7 @@ from flownav.navigation.reasons import HORIZONTAL
 
 RECENT_S = 1.0  # a range and a landed state that are older do not say where a navigator begins: chosen
 HEIGHT_DOUBTED = "height_doubted"
-# What a sensor that does not serve may cause.
+# Reasons that an unused sensor may cause.
 OUTRANKED = ("", "position_invalid", "dead_reckoning", "flow_doubted", "unprotected")
 NAN = float("nan")
 
@@ -25,8 +25,8 @@ NAN = float("nan")
 class Offering:
     """Judges the estimate before it is sent.
 
-    alarms: sensors that are heard and not fused, since when and why; past_alarms: the longest of each sensor; settled:
-    an estimate was there to be sent, so that the vehicle is the vehicle.
+    alarms: sensors that are received and not fused, since when and why; past_alarms: the longest of each sensor;
+    settled: an estimate was there to be sent, so that the vehicle is the vehicle.
     """
 
     def __init__(self, limits: Limits, keeper: Keeper, hearing: Hearing, filtering: Filtering) -> None:
@@ -117,7 +117,7 @@ class Offering:
         return reason, estimate if not reason or reason in PLACES else None
 
     def say_origin(self, event: str, t_s: float) -> None:
-        """What became of an origin goes into the record."""
+        """Record what happened to the autopilot's origin."""
         origin = self.hearing.origin
         if event == "moved":
             offset_m = sum(value**2 for value in origin.offset_ned_m) ** 0.5

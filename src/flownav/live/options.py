@@ -1,4 +1,4 @@
-"""What a live session is asked to do, and the limits within which it sends."""
+"""The options of a live session, and the limits within which it sends."""
 
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -34,13 +34,14 @@ class Limits:
 
 @dataclass(frozen=True)
 class Options:
-    """What a session is asked to do.
+    """The options of a session.
 
-    accept: who beside the autopilot may tell which message. key: a MAVLink signing key. identified: a flow sensor's
-    latency and axes; its gains are the settings'. margin_s: what the horizon waits beyond the largest delay that is
-    stated: an IMU period and jitter. most_horizon_s: the longest that it waits for any stream. listen_s: how long the
-    vehicle is listened to before it is decided which sensors serve. restart_s: a longer silence of the vehicle, or its
-    reboot, begins the navigation anew. capacity_bytes_s: what the link carries each way; None: more than is asked for.
+    accept: which senders other than the autopilot may send which message. key: a MAVLink signing key. identified: a
+    flow sensor's latency and axes; its gains are the settings'. margin_s: the time that the horizon waits beyond the
+    largest delay that is stated: an IMU period and jitter. most_horizon_s: the longest that it waits for any stream.
+    listen_s: how long the vehicle is listened to before it is decided which sensors serve. restart_s: a longer silence
+    of the vehicle, or its reboot, begins the navigation anew. capacity_bytes_s: the link's capacity each way; None:
+    more than is asked for.
     """
 
     send: Sending = "odometry"

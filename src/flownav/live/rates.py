@@ -15,7 +15,7 @@ from flownav.logs.mavlink.framing import ARDUPILOT, PX4
 ARDUPILOT_MOST_HZ = 1.0 / 0.021
 PX4_LEAST_HZ = 30.0  # of estimates; EKF2 does not fuse fewer (docs/en/ros/external_position_estimation.md)
 # message: id and rate [Hz]; the IMU moves the state, the others correct it
-# Other inertial sensors are heard beside the one that serves (live/inertial.py); a vehicle without them says nothing.
+# Other inertial sensors are compared with the one in use (live/inertial.py); a vehicle without them sends none.
 OTHER_IMU = {"SCALED_IMU2": (116, 50), "SCALED_IMU3": (129, 50)}
 COMMON = {
     "ATTITUDE_QUATERNION": (31, 50),
@@ -86,9 +86,9 @@ Streams = dict[str, tuple[int, float]]  # by message: its number and its rate [H
 
 
 class Plan(NamedTuple):
-    """What a link can carry. bytes_s: what the streams take; estimate_hz: infinite where nothing limits it.
+    """The rates that a link can carry. bytes_s: what the streams take; estimate_hz: infinite where nothing limits it.
 
-    lacks: what it is too slow for, in words; "" where it carries the least that is needed.
+    lacks: the needs that it is too slow for, in words; "" where it carries the minimum.
     """
 
     streams: Streams
@@ -98,7 +98,7 @@ class Plan(NamedTuple):
 
 
 def bytes_of(streams: Streams, *, ardupilot: bool, signed: bool = False) -> float:
-    """What streams take of a line [bytes/s]."""
+    """The capacity that streams take of a line [bytes/s]."""
     extra = SIGNATURE_BYTES if signed else 0
     return sum(
         rate_hz * (FRAME_BYTES.get(name, 0) + extra)

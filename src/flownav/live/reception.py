@@ -46,21 +46,22 @@ def accepted_of(text: str) -> Accepted:
 
 
 def accepted_by(texts: Iterable[str]) -> tuple[Accepted, ...]:
-    """What is accepted beside the autopilot: `accepted_of` each, in place of BESIDE for the messages that they name."""
+    """The senders accepted next to the autopilot: `accepted_of` each text, in place of BESIDE for the messages they
+    name.
+    """
     stated = tuple(map(accepted_of, texts))
     named = {entry.message for entry in stated}
     return (*stated, *(entry for entry in BESIDE if entry.message not in named))
 
 
 class Reception:
-    """Bytes in, messages of the vehicle out, and those that `accept` lets others tell.
+    """Bytes in, messages of the vehicle out, and those that `accept` allows of other senders.
 
-    The vehicle is the first autopilot whose HEARTBEAT is heard, of the system and component that were asked for
-    (None: any), until a better one is taken (autopilots). What flownav itself sends (`own`) and another component of
-    the vehicle's system repeats is not taken.
-    counts: by reason, what was not listened to (`other_system`, `unsigned`, `bad_signature`, `replayed`,
-    `bad_checksum`, `truncated`, `skipped_bytes`, `unknown_message`, `undecodable`, `before_heartbeat`), and `lost`, the
-    vehicle's frames that never came, by its sequence numbers.
+    The vehicle is the first autopilot whose HEARTBEAT is received, of the system and component that were asked for
+    (None: any), until a better one is taken (autopilots). flownav's own messages (`own`) that another component of the
+    vehicle's system repeats are not taken. counts: the messages that were not taken, by reason (`other_system`,
+    `unsigned`, `bad_signature`, `replayed`, `bad_checksum`, `truncated`, `skipped_bytes`, `unknown_message`,
+    `undecodable`, `before_heartbeat`), and `lost`, the vehicle's frames that never came, by its sequence numbers.
     """
 
     def __init__(
@@ -91,13 +92,13 @@ class Reception:
 
     @property
     def counts(self) -> Counter[str]:
-        """What was not listened to, by reason."""
+        """Number of messages that were not taken, by reason."""
         rejected = self._check.rejected if self._check else Counter[str]()
         return Counter({k: n for k, n in (self._counts + self._frames.damage + rejected).items() if n})
 
     @property
     def others(self) -> list[tuple[int, int]]:
-        """Other autopilots that were heard: system and component."""
+        """Other autopilots that were received: system and component."""
         return sorted(self._others)
 
     def feed(self, piece: bytes, *, whole: bool) -> Iterator[Message]:
@@ -178,7 +179,7 @@ class Reception:
         self.vehicle, self._sequence = vehicle, None
 
     def is_of_vehicle(self, message: Message) -> bool:
-        """Whether the autopilot itself told it."""
+        """Whether the autopilot itself sent the message."""
         return self.vehicle is not None and sender_of(message) == self.vehicle[:2]
 
     def _accepts(self, message_id: int, who: tuple[int, int]) -> bool:

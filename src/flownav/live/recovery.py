@@ -20,7 +20,7 @@ Value = TypeVar("Value")
 
 
 class TruthRow(NamedTuple, Generic[Value]):
-    """What a simulator said of the truth, as a journal keeps it; place: latitude, longitude [deg], altitude [m]."""
+    """A simulator's true state, as a journal keeps it; place: latitude, longitude [deg], altitude [m]."""
 
     t_s: Value
     place_deg_m: Annotated[Value, 3]
@@ -43,7 +43,8 @@ WIDTHS = {
 
 
 class Recovered(NamedTuple):
-    """What a journal held. ended: its session came to its end; torn_bytes: at its end, of a block that is not whole.
+    """The content of a journal. ended: its session came to its end; torn_bytes: at its end, of a block that is not
+    whole.
 
     blocks: whole ones; lost_bytes, lost_blocks: in its middle; unclaimed: rows fed to a navigator of which nothing is
     known, which are left out.

@@ -1,8 +1,8 @@
-"""What a vehicle is asked for: each stream at its rate, one command at a time, and a simulator for the truth.
+"""Requests to a vehicle: each stream at its rate, one command at a time, and a simulator's truth.
 
 ArduPilot's simulator has parameters that no vehicle has (SIM_SPEEDUP), so it is asked for one; a vehicle answers
-nothing, or that there is none. PX4's says so in its HEARTBEAT (MAV_MODE_FLAG_HIL_ENABLED). Who tells the truth unasked
-is one. A vehicle is not asked for a truth that it does not have: ArduPilot would complain to every ground station.
+nothing, or that there is none. PX4's sets MAV_MODE_FLAG_HIL_ENABLED in its HEARTBEAT. A sender of unrequested truth is
+one. A vehicle is not asked for a truth that it does not have: ArduPilot would complain to every ground station.
 """
 
 from collections import Counter
@@ -21,10 +21,10 @@ ACCEPTED, TEMPORARILY_REJECTED, IN_PROGRESS = 0, 1, 5  # MAV_RESULT
 # test_live_recordings).
 ANSWER_S = 0.5
 TRIES = 3
-SILENT_S = 2.0  # a stream that has said nothing for so long is asked for again
-SILENT_PERIODS = 5.0  # and for so many of its periods
+SILENT_S = 2.0  # a stream without a message for this long is requested again
+SILENT_PERIODS = 5.0  # and for this number of its periods
 MOST_PATIENCE_S = 30.0  # a stream that has never come is asked for ever more seldom, down to this
-ORIGIN, GLOBAL_ORIGIN = "GPS_GLOBAL_ORIGIN", 49  # told when it is asked for, and when it is set
+ORIGIN, GLOBAL_ORIGIN = "GPS_GLOBAL_ORIGIN", 49  # sent when it is requested, and when it is set
 
 
 class Truth(NamedTuple):
@@ -41,7 +41,7 @@ TRUTHS = {truth.name: truth for truth in (SIM_STATE, HIL_STATE)}
 
 
 class Simulator:
-    """What is known of the vehicle being one. truth: what to ask it for; None while it is taken for a vehicle."""
+    """Whether the vehicle is a simulator. truth: the message to request; None while it is taken for a vehicle."""
 
     def __init__(self) -> None:
         self.truth: Truth | None = None

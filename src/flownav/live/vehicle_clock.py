@@ -115,7 +115,7 @@ class VehicleClock:
         return stepped
 
     def _stepped(self, offset_s: float) -> bool:
-        """Whether two exchanges in a row agree on an offset that is more than STEP_S from the one told before."""
+        """Whether two exchanges in a row agree on an offset that is more than STEP_S from the one in use."""
         if not abs(offset_s - self._told_s) > STEP_S:
             self._told_s, self._doubted_s = offset_s, NAN
             return False
@@ -143,7 +143,7 @@ class VehicleClock:
         return min(fresh, key=lambda exchange: exchange.round_trip_s, default=None)
 
     def now_s(self, now_s: float) -> float:
-        """Session time at an instant of our clock; NaN before the vehicle's clock was heard. Never behind a stamp.
+        """Session time at an instant of our clock; NaN before the vehicle's clock was received. Never behind a stamp.
 
         A loaded link makes every stamp seem later, and the time with it: it goes slower until that is made up.
         """

@@ -1,7 +1,7 @@
 """One CSV file of a log as columns of numbers, its rows checked: finite, inside limits, in time order.
 
-Bad rows are thrown away and counted by reason. Where so many are bad that the file cannot be what its column
-names say (a wrong unit, two logs in one file), that is an InputError of one line.
+Bad rows are thrown away and counted by reason. Where too many are bad for the file to be what its column names state (a
+wrong unit, two logs in one file), that is an InputError of one line.
 """
 
 from collections import Counter

@@ -53,12 +53,12 @@ def log_of_record(path: Path, record: Record) -> Log:
         segments = [dict(segment) for segment in record.manifest["segments"]]
         parameters = dict(record.manifest["parameters"])
         if not len(fed):
-            raise InputError(f"{path}: its navigator heard nothing that it could use")
+            raise InputError(f"{path}: its navigator received nothing that it could use")
         _check(fed, len(segments))
         numbers = fed[:, FED.index("segment")].astype(int)
         heard = _streams(fed)
         if not heard:
-            raise InputError(f"{path}: its navigator heard nothing that it could use")
+            raise InputError(f"{path}: its navigator received nothing that it could use")
         streams = _with_late(heard, record.manifest.get("live"))
         parts = tuple(FedSegment(_floats(segments[i]), _queue(fed, numbers == i)) for i in range(len(segments)))
     except (KeyError, IndexError, TypeError, ValueError) as error:
@@ -147,7 +147,7 @@ def _streams(fed: Array) -> dict[Sensor, Stream]:
 
 
 def _with_late(streams: dict[Sensor, Stream], facts: Any) -> dict[Sensor, Stream]:
-    """What a live session's horizon left out as late, as rejections of the sensors, heard in time or never."""
+    """Streams with the readings that a live session's horizon left out as late, as rejections, for every sensor."""
     dropped = facts.get("dropped") if isinstance(facts, dict) else None
     for sensor in Sensor:
         late = dropped.get(f"{sensor.name.lower()}: {LATE}") if isinstance(dropped, dict) else None

@@ -140,7 +140,7 @@ def _sensors(topics: Topics, flow: Topic | None, attitude: Stream | None) -> Ite
 
 
 def _slow_imu(topics: Topics) -> str:
-    """What inertial readings there are, where they come too slowly to be used."""
+    """The note on the inertial readings, where they come too slowly to be used; "" without any."""
     label, rate_hz, count = sensed.fastest_imu(topics)
     if not label or rate_hz >= sensed.LEAST_IMU_HZ:
         return ""

@@ -132,7 +132,7 @@ def _keep_downward(topic: Topic) -> None:
 
 
 def reading_limits(topics: Topics, flow: Topic | None) -> dict[str, tuple[float, float]]:
-    """What the rangefinder and the flow sensor state of themselves; 0 and 0, or nonsense, is no statement."""
+    """The limits that rangefinder and flow sensor state of themselves; 0 and 0, or nonsense, is no statement."""
     ranges = [topic for topic in topics.of("distance_sensor") if len(topic)]
     limits = {}
     if ranges:

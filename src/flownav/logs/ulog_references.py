@@ -1,4 +1,4 @@
-"""What a ULog holds to compare with: ground truth, visual odometry, and what the autopilot itself estimated."""
+"""A ULog's references: ground truth, visual odometry, and the autopilot's own estimates."""
 
 from dataclasses import replace
 

@@ -104,8 +104,8 @@ class Topics:
 def read_topics(path: Path, wanted: Collection[str], fields: Collection[str], states: Collection[str]) -> Topics:
     """The wanted topics with the fields named, times in seconds since the first reading.
 
-    states: topics that hold for longer than they are published; what they said before the first reading of a sensor
-    is put at its time. InputError where the file cannot be read, is no ULog, or holds none of the topics.
+    states: topics that hold for longer than they are published; their values before the first reading of a sensor are
+    put at its time. InputError where the file cannot be read, is no ULog, or holds none of the topics.
     """
     content, sha256 = _content(path)
     framed = frame(path, content, wanted)
@@ -184,7 +184,7 @@ def count_from_first(found: list[Topic], states: Collection[str]) -> float:
 
 
 def _notes(framed: Framed) -> list[str]:
-    """What was wrong with the file as a whole, one line each."""
+    """Notes on the damage of the file as a whole, one line each."""
     notes = []
     if framed.dropouts_s:
         notes.append(

@@ -1,4 +1,4 @@
-"""Python called from compiled loops: C functions with an address, whose first mistake is kept and told afterwards."""
+"""Python called from compiled loops: C functions with an address; their first exception is raised afterwards."""
 
 import ctypes
 import inspect
@@ -29,7 +29,7 @@ class Mistakes:
 
 @contextmanager
 def telling(name: str) -> Iterator[None]:
-    """What a part raises in here is an InputError of one line, and its exception the cause; Ctrl-C stays Ctrl-C."""
+    """Turn a part's exception into an InputError of one line with that exception as its cause; Ctrl-C stays Ctrl-C."""
     try:
         yield
     except (InputError, KeyboardInterrupt):

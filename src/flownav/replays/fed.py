@@ -52,7 +52,7 @@ def prepared_as_fed(log: Log) -> Prepared:
 
 
 def segments_of(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile) -> list[FedSegment]:
-    """What each navigator of a log or record is fed, and its equipment: as a replay does it, with nothing cut."""
+    """The input of each navigator of a log or record, and its equipment: as a replay does it, with nothing cut."""
     if log.fed:
         return list(log.fed)
     prepared = prepare(log, options)

@@ -37,7 +37,7 @@ HELD_S = 0.5
 
 @dataclass(frozen=True)
 class ReplayOptions:
-    """What a user may ask of a replay."""
+    """The user's options of a replay."""
 
     gps_delay_s: float = 0.22  # ArduPilot's default lag of a u-blox
     gps_outages_s: tuple[tuple[float, float], ...] = ()
@@ -278,7 +278,7 @@ def _followed(flow: Stream, difference: Array) -> Array:
 
 @kernel
 def _low_pass(value: Array, gain: Array, followed: Array) -> None:
-    """y += gain (value - y), column by column; value and what comes of it (n, k), gain (n,)."""
+    """y += gain (value - y), column by column; value and result (n, k), gain (n,)."""
     for column in range(value.shape[1]):
         state = 0.0
         for row in range(value.shape[0]):

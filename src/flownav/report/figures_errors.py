@@ -99,7 +99,8 @@ def _reach(values: Array, band: Array) -> float:
 
 
 def from_first_fix(record: Record) -> list[Panel]:
-    """Errors of what was flown on from the first fix of the pad to just after the touchdown; none without a fix.
+    """Errors of the estimate used by the autopilot, from the first fix of the pad to just after the touchdown; none
+    without a fix.
 
     Before the fix the vehicle takes its pad to be where GPS and the scenario put it, metres off; after it the errors
     are those of the landing, and have an axis of their own.
@@ -123,7 +124,7 @@ def from_first_fix(record: Record) -> list[Panel]:
 
 
 def _error_of(record: Record, role: str, columns: tuple[str, ...], window: Window | None = None) -> Track | None:
-    """What a table says of these states less the truth, in a window; None where either says nothing of them."""
+    """A table's states less the truth, in a window; None where either lacks them."""
     source, truth = track(record, role, columns), track(record, "truth", columns)
     return None if source is None or truth is None else series.difference(source, truth).within(window)
 
@@ -137,7 +138,9 @@ def _drawn(record: Record, role: str, titles: tuple[str, ...], error: Track) -> 
 
 
 def landing_errors(record: Record, moment: Moment, window: Window) -> list[Panel]:
-    """Errors of position and velocity about a moment, of what was flown on or else of the estimate; none without."""
+    """Errors of position and velocity about a moment, of the estimate used by the autopilot or else of the navigator's;
+    none without.
+    """
     role = "flown" if has(record, "flown") else "estimate"
     panels = []
     for columns, titles, what, unit in ERRORS:

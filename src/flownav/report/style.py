@@ -108,7 +108,7 @@ def axis(title: str = "") -> dict[str, Any]:
 
 
 def layout(height_px: int) -> dict[str, Any]:
-    """What every figure shares: transparent ground, fonts, legend above, room for the axes."""
+    """The layout that every figure shares: transparent ground, fonts, legend above, room for the axes."""
     return {
         "height": height_px,
         "autosize": True,
@@ -160,7 +160,7 @@ def _packed(value: Any) -> Any:
 
 
 def figure(chart: Chart) -> Drawing:
-    """What is drawn of a chart."""
+    """The Plotly drawing of a chart."""
     data: list[dict[str, Any]] = []
     named: set[str] = set()
     for row, one_axis in enumerate(chart.axes, 1):

@@ -2,7 +2,7 @@
 
 Of one flight by its innovations (`consistency_of`): are they as large as it states, and is each one news. Of many
 flights by their errors from a known truth. Those are over steps in flight, those without skid contact, from the
-filter's start on: at rest on the ground a filter is told that it does not move, a pseudo-measurement whose stated sigma
+filter's start on: at rest on the ground a filter is given zero velocity, a pseudo-measurement whose stated sigma
 is a guess, and its errors there are none of a flying vehicle's.
 
 Sums, not flights, are kept: memory does not grow with the number of flights.

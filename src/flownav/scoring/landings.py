@@ -115,7 +115,7 @@ def touches_of_flights(rows: Array, touchdown: Mapping[str, Any]) -> dict[str, A
 
 
 def verdict_of(row: Array) -> str:
-    """What became of a flight: landed, crashed, went around (and is aloft at the end), or none of these."""
+    """The outcome of a flight: landed, crashed, went around (and is aloft at the end), or none of these."""
     if row[BROKEN] > 0.0:
         return "crashed"
     if succeeded(row[None, :])[0]:
@@ -165,8 +165,8 @@ UP_SHARE = 0.5  # of the largest commanded height: above it a vehicle is up, and
 def takeoffs(height_m: Array, commanded_m: Array, sees_flow: Array, period_s: float) -> Array:
     """One row a flight, (lanes, len(TAKEOFF_COLUMNS)), of histories (epochs, lanes); heights are of the skids.
 
-    over_commanded_m: the largest height less the largest commanded one; without_flow_s: how long the flow sensor said
-    nothing (sees_flow 0) while the vehicle was above UP_SHARE of the largest commanded height.
+    over_commanded_m: the largest height less the largest commanded one; without_flow_s: how long the flow sensor gave
+    no flow (sees_flow 0) while the vehicle was above UP_SHARE of the largest commanded height.
     """
     top_m = commanded_m.max(axis=0)
     blind = (height_m > UP_SHARE * top_m) & (sees_flow <= 0.0)

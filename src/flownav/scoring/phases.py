@@ -97,7 +97,7 @@ def contact_of(record: Record, t_s: Array) -> NDArray[np.bool_] | None:
 
 
 def _held(times: Array, said: NDArray[np.bool_], t_s: Array) -> NDArray[np.bool_]:
-    """The last that was said at each instant, breaks in contact shorter than a flutter bridged."""
+    """The last landed state reported at each instant, with breaks in contact shorter than a flutter bridged."""
     rows = np.clip(np.searchsorted(times, t_s, side="right") - 1, 0, len(times) - 1)
     held = said[rows]
     width = round(LONGEST_CONTACT_GAP_S / GRID_S)

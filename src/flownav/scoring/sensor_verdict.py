@@ -1,4 +1,4 @@
-"""What the consistency of a sensor's innovations means to those who fly with it: harmless, or something to act on."""
+"""The meaning of a sensor's innovation consistency for its user: harmless, or something to act on."""
 
 from collections.abc import Iterable
 
@@ -32,6 +32,6 @@ def verdict(nis_per_dof: float, *, white: bool, refused: float = 0.0) -> str:
 
 
 def meanings(verdicts: Iterable[str]) -> list[str]:
-    """What the verdicts at hand mean for use and what to do, a sentence for each that occurs."""
+    """The meaning of each verdict and the action to take, a sentence for each that occurs."""
     found = list(verdicts)
     return [f"{word}: {meaning}" for word, meaning in MEANING.items() if any(said.startswith(word) for said in found)]

@@ -57,7 +57,7 @@ def deciding(requirement: Requirement, judgements: Sequence[Judgement], rows: Ar
 
 
 def drawn(flights: int, sample: int) -> NDArray[np.int64]:
-    """The places of so many flights, which nobody can know before; all where there are no more."""
+    """The numbers of `sample` of `flights` flights, drawn at random, sorted; all where there are no more."""
     return np.array(sorted(SystemRandom().sample(range(flights), min(sample, flights))), np.int64)
 
 

@@ -25,7 +25,7 @@ from flownav.core.measurement import Array
 from flownav.core.text import finite_or_none
 from flownav.simulation.ensemble import Ensemble
 
-PLAN_FAILURES = (0, 1, 2)  # failures of the plans that are told
+PLAN_FAILURES = (0, 1, 2)  # numbers of failures of the plans that are stated
 
 
 class Judgement(NamedTuple):
@@ -73,7 +73,7 @@ class Judgement(NamedTuple):
         }
 
     def more(self) -> str:
-        """What more flights would be needed, in words; "" where the requirement is shown."""
+        """The further flights that are needed, in words; "" where the requirement is shown."""
         table, rate = self.table, self.failures / self.flights
         if self.verdict == "pass":
             return ""

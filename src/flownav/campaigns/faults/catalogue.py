@@ -179,7 +179,7 @@ def law_of(
 ) -> SensorFault:
     """A fault from begins_s to ends_s; course_rad: the direction in which it moves a position.
 
-    flow_period_s: between two readings of flow, of which so many are kept as `flow_late` needs at up to 70 Hz.
+    flow_period_s: between two readings of flow; as many readings are kept as `flow_late` needs at up to 70 Hz.
     KeyError where it cannot be flown (`NOT_FLOWN`).
     """
     does: dict[str, Any] = dict(DOES[fault.name])

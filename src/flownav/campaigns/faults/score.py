@@ -1,4 +1,4 @@
-"""What a fault did to a navigator: when it was noticed, how far the estimate went, when it was back.
+"""The effect of a fault on a navigator: time to notice, largest error of the estimate, time to recover.
 
 Each figure is defined in docs/explanation/faults.md. A run with the fault is compared with one of the same
 flight without it.
@@ -138,7 +138,7 @@ def wrongly_fused(run: Navigated, clean: Stream, faulty: Stream) -> int:
 
 
 def _said(stream: Stream, component: int) -> list[tuple[int, bytes]]:
-    """What every reading says of a component: its time stamp and the bytes, of all where the component is of all."""
+    """Time stamp and bytes of each reading's component; of the whole reading where a component belongs to all of it."""
     columns = slice(component, component + 1) if stream.sensor in BY_COLUMN else slice(None)
     content = np.column_stack([stream.value[:, columns], stream.variance[:, columns], stream.quality])
     return [(_stamp(t_s), row.tobytes()) for t_s, row in zip(stream.t_s, content, strict=True)]

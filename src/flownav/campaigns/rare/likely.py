@@ -79,7 +79,9 @@ def _missing(event: Event, rows: Array) -> NDArray[np.bool_]:
 
 
 def _finite(values: Array) -> Array:
-    """What is infinite is farthest from this part of the event: it is the other part's."""
+    """Values with -inf for those that are infinite: these are farthest from this part of the event and belong to the
+    other part.
+    """
     return np.where(np.isfinite(values), values, -np.inf)
 
 
@@ -140,7 +142,7 @@ def rank_inputs(names: list[str], inputs: Array, weights: Array, independent: fl
 def rank_noise(flight: Flight, seed: int, states: States, weights: Array, independent: float) -> list[dict[str, Any]]:
     """The window of each source whose sum of noise differs most, where it does by more than chance.
 
-    Of many flights the noise of some is looked at, one in so many of them.
+    Of many flights the noise of only every n-th is read, NORMALS_READ normals at most.
 
     A window's sum is over the readings in WINDOW_S, in standard deviations of such a sum: slow noise shows, fast does
     not.

@@ -1,4 +1,4 @@
-"""What keeps a vehicle from arming that no parameter shows: its origin where it has no GPS, and what it says itself."""
+"""Blocks to arming that no parameter shows: the origin of a vehicle without GPS, and the autopilot's own report."""
 
 from typing import NamedTuple
 
@@ -76,7 +76,7 @@ def set_origin(talk: Talk, place: Place) -> Place | None:
 
 
 def readiness(talk: Talk, make: str, values: dict[str, Value], origin: Place | None = None) -> Readiness:
-    """What is missing to arm. origin: to be set where the vehicle is disarmed."""
+    """The conditions that are missing to arm. origin: to be set where the vehicle is disarmed."""
     without = has_no_gps(make, values)
     assert talk.vehicle is not None
     place = set_origin(talk, origin) if origin is not None and talk.armed is False else None
@@ -91,7 +91,7 @@ def readiness(talk: Talk, make: str, values: dict[str, Value], origin: Place | N
 
 
 def said_of_arming(talk: Talk) -> list[str]:
-    """What the autopilot says of arming when it is asked to run its checks, each once; nothing of one that is armed."""
+    """The autopilot's messages about arming when it is asked to run its checks, each once; none where it is armed."""
     assert talk.vehicle is not None
     if talk.armed is not False:
         return []

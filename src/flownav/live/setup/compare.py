@@ -27,7 +27,7 @@ class Port(NamedTuple):
 
 
 def port_names(family: str) -> list[str]:
-    """What is asked of the vehicle to find the port."""
+    """The parameters that are read from the vehicle to find the port."""
     if family == "SERIAL":
         return [f"SERIAL{n}_{what}" for n in ARDUPILOT_PORTS for what in ("PROTOCOL", "BAUD")]
     instances = [f"MAV_{n}_{what}" for n in PX4_INSTANCES for what in ("CONFIG", "MODE", "RATE")]
@@ -182,7 +182,7 @@ def _words(row: Wanted) -> str:
 
 
 def blocks_of(known: Knowledge, values: dict[str, Value]) -> list[Block]:
-    """What keeps the vehicle from arming, of what is known here."""
+    """Blocks to arming that follow from the known rules and the vehicle's values."""
 
     def words(rule: Arming, name: str) -> str:
         needed = f"; {rule.needs} is {values[rule.needs].number:g}" if rule.needs else ""

@@ -27,7 +27,7 @@ UNKNOWN_PARAMETER = 1  # MAV_PARAM_ERROR_DOES_NOT_EXIST
 
 
 class Talk:
-    """Who is spoken with, and what is said. clock and wait are the machine's unless a test gives its own."""
+    """The exchange of messages with a vehicle. clock and wait are the machine's unless a test gives its own."""
 
     def __init__(
         self,
@@ -48,7 +48,7 @@ class Talk:
 
     @property
     def vehicle(self) -> Vehicle | None:
-        """The first autopilot that was heard."""
+        """The first autopilot that was received."""
         return self.reception.vehicle
 
     @property

@@ -1,5 +1,5 @@
-"""Sensors that a simulator lacks, looking at its truth: a flow sensor, told as MAVLink's OPTICAL_FLOW_RAD, and a second
-receiver of GPS, told as HIL_GPS.
+"""Sensors that a simulator lacks, made from its truth: a flow sensor, sent as MAVLink's OPTICAL_FLOW_RAD, and a second
+GPS receiver, sent as HIL_GPS.
 """
 
 import random
@@ -17,7 +17,7 @@ from flownav.logs.mavlink.messages import TrueState
 
 COMPONENT = 158  # MAV_COMP_ID_PERIPHERAL
 ONBOARD = 18  # MAV_TYPE
-EXPOSURE_S, DELAY_S = 0.02, 0.02  # 50 Hz, told 20 ms later
+EXPOSURE_S, DELAY_S = 0.02, 0.02  # 50 Hz, sent 20 ms later
 NOISE_RAD_S, GYRO_NOISE_RAD_S = 0.05, 0.003  # settings.flow_sigma_rad_s, and a quiet gyro
 LENS_M = 0.1  # the lens above the ground on its legs
 QUALITY = 200

@@ -32,8 +32,8 @@ class NotFlown(Exception):
 
 
 class Case(NamedTuple):
-    """What a flight's vehicle is given. gps: `on`, `cut` once it hovers, or `never`; wind_m_s from wind_deg; heading at
-    the start [deg]; send: what flownav sends; pad: whether it lands on one that a camera sees.
+    """The conditions of a flight. gps: `on`, `cut` once it hovers, or `never`; wind_m_s from wind_deg; heading at
+    the start [deg]; send: the message that flownav sends; pad: whether it lands on one that a camera sees.
     """
 
     vehicle: str
@@ -81,7 +81,7 @@ class Pilot(ABC):
 
     @abstractmethod
     def start(self) -> None:
-        """Start the simulator, and wait until it is heard. NotFlown where it is not."""
+        """Start the simulator, and wait until it is received. NotFlown where it is not."""
 
     @abstractmethod
     def take_off(self, height_m: float) -> None:

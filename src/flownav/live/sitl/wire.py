@@ -22,7 +22,7 @@ from flownav.logs.mavlink.outgoing import ARMED
 HOST = "127.0.0.1"
 STATION = (255, 190)  # the ground station's system, and MAV_COMP_ID_MISSIONPLANNER
 GCS, INVALID = 6, 8  # MAV_TYPE, MAV_AUTOPILOT
-BEAT_S, TURN_S = 0.1, 0.02  # of what is said again and again; chosen
+BEAT_S, TURN_S = 0.1, 0.02  # of messages that are repeated; chosen
 ODOMETRY, SPEED, VISION = 331, 103, 102
 LARGEST = 65536
 STAMPED = 35  # SO_TIMESTAMPNS of Linux: the kernel says when a datagram arrived
@@ -40,14 +40,14 @@ class Told(NamedTuple):
 
 
 class Truth(NamedTuple):
-    """What a simulator says is so, when it arrived."""
+    """A simulator's true state, and when it arrived."""
 
     now_s: float
     state: TrueState
 
 
 class History:
-    """What happened in a flight: truth, what flownav said, what the autopilot believed, words, on our clock [s]."""
+    """The events of a flight: truth, flownav's messages, the autopilot's estimates, texts, on our clock [s]."""
 
     def __init__(self) -> None:
         self.truth: list[Truth] = []
@@ -62,7 +62,7 @@ class History:
 
 
 class Line:
-    """What the companion's line does to frames: loses a share of them, or all while it is cut."""
+    """The faults of the companion's line: it loses a share of frames, or all while it is cut."""
 
     def __init__(self, seed: int) -> None:
         self.loss, self.cut = 0.0, False
@@ -88,8 +88,8 @@ class Wire:
         self._vehicle_peer: Any = None
         self._frames, self._coder, self._mav = StreamFrames(), coder(), coder(*STATION)
         self.latest: dict[str, Message] = {}
-        self.heard: list[Callable[[Message], None]] = []  # who is told of each message of the autopilot
-        self.beats: list[Callable[[Any], list[Message]]] = []  # what is said ten times a second
+        self.heard: list[Callable[[Message], None]] = []  # called with each message of the autopilot
+        self.beats: list[Callable[[Any], list[Message]]] = []  # messages that are sent ten times a second
         self.turns: list[Callable[[float], None]] = []  # what is done each turn of the loop
         self.kept: Callable[[bytes, bool], None] | None = (
             None  # who keeps the frames that pass, and whether to the vehicle
@@ -165,7 +165,7 @@ class Wire:
             for message in what(self._mav):
                 self.say(message)
 
-    # -- what is heard -----------------------------------------------------------------------------------------
+    # -- reception -----------------------------------------------------------------------------------------------
     def _hear(self, piece: bytes, now_s: float) -> None:
         for frame, content in self._frames.feed(piece, whole=True):
             if frame.component != 1:

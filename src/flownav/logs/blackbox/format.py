@@ -111,7 +111,7 @@ def _header(content: bytes, start: int, end: int) -> Header | None:
 
 
 def _fields(lines: dict[str, str], letter: str, names: tuple[str, ...] = ()) -> Fields:
-    """What the lines say of a kind of frame; empty where they do not, or cannot be."""
+    """The fields of a kind of frame as the header lines define them; empty where they do not, or cannot be."""
     names = names or tuple(filter(None, lines.get(f"Field {letter} name", "").split(",")))
     predictors, encodings = (_codes(lines.get(f"Field {letter} {what}", "")) for what in ("predictor", "encoding"))
     sound = 0 < len(names) <= MOST_FIELDS and len(names) == len(predictors) == len(encodings)
@@ -154,7 +154,7 @@ def signed_vb(content: Bytes, pos: int, end: int) -> tuple[int, int]:
 
 @kernel
 def sign_extended(value: int, bits: int) -> int:
-    """A number of so many bits in two's complement."""
+    """A number of `bits` bits in two's complement."""
     return value - (1 << bits) if value & (1 << (bits - 1)) else value
 
 

@@ -1,4 +1,4 @@
-"""What a DataFlash log says besides its sensors: parameters, modes, EKF3's source set, messages, clipping."""
+"""A DataFlash log's content besides its sensors: parameters, modes, EKF3's source set, messages, clipping."""
 
 from collections.abc import Iterator
 

@@ -32,7 +32,7 @@ ClockName = tuple[int, int, str]  # system, component, "boot" or "unix"
 
 
 class Stamp(NamedTuple):
-    """What a message says of its time: on whose clock, how much [s], and at what that count wraps [s] (0: never)."""
+    """The time stamp of a message: whose clock, its time [s], and the time at which it wraps [s] (0: never)."""
 
     clock: ClockName
     stamp_s: float
@@ -63,7 +63,7 @@ class ClockState(NamedTuple):
     clocks: Mapping[ClockName, _Clock] = {}
 
     def now_s(self, arrival_s: float) -> float:
-        """The log's time at an arrival; NaN before the reference clock was heard."""
+        """The log's time at an arrival; NaN before the reference clock was received."""
         return self.log_s + min(max(arrival_s - self.arrival_s, 0.0), LONGEST_WAIT_S)
 
     @property
@@ -131,7 +131,7 @@ def told_unix_time(state: ClockState, clock: ClockName, unix_s: float, boot_s: f
 
 
 def stamp_of(message: Message, system: int, component: int, reference_s: float = float("nan")) -> Stamp | None:
-    """What a message says of its time; None where it has no stamp, or 0, which means the same.
+    """The time stamp of a message; None where it has no stamp, or 0, which means the same.
 
     The trap: ArduPilot writes milliseconds since boot into OPTICAL_FLOW.time_usec. Of both readings the one nearer
     to the autopilot's clock (`reference_s`, seconds since boot) is right.

@@ -152,7 +152,7 @@ STATES: dict[str, Callable[[Message], LocalState | GlobalState | TrueState | Non
 
 # -- measurements -------------------------------------------------------------------------------------------
 def measurements(message: Message, t_s: float, context: Context) -> tuple[Outcome, ...]:
-    """What a message measures at its log time [s], and what of it was dropped and why; empty where nothing.
+    """The measurements in a message at its log time [s], and what of it was dropped and why; empty where nothing.
 
     A message of a kind that measures nothing yields nothing. Values that are not finite or that no vehicle can have
     are Dropped (`not_finite`, `out_of_range`, `not_unit`).

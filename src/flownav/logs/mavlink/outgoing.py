@@ -29,7 +29,7 @@ WRAP_MS = 2**32
 
 
 class Estimate(NamedTuple):
-    """What is sent of a filter's state.
+    """The part of a filter's state that is sent.
 
     time_us: microseconds on the clock agreed with the autopilot (its boot time by TIMESYNC, or UNIX). Position and
     velocity in NED [m, m/s], attitude body FRD to earth NED, body rates [rad/s] (NaN where unknown).
@@ -115,7 +115,7 @@ def landing_target(
 
     tan_forward, tan_right: tangents of the angles from body down; distance along the line of sight [m], NaN where
     unknown: then it is sent as 0 and the position as not valid. angle_x is to the right, angle_y backwards.
-    pad_ned_m: the pad's place about the autopilot's origin, told in LOCAL_NED in place of the one in BODY_FRD.
+    pad_ned_m: the pad's place about the autopilot's origin, sent in LOCAL_NED in place of the one in BODY_FRD.
 
     Trap. ArduPilot takes BODY_FRD and no other frame, PX4 LOCAL_NED and no other: it refuses a valid position in
     BODY_FRD with `landing target: unsupported coordinate frame` (mavlink_receiver.cpp, handle_message_landing_target).

@@ -27,7 +27,7 @@ from flownav.logs.mavlink import framing
 KEY_BYTES = 32
 EPOCH_UNIX_S = 1_420_070_400  # 2015-01-01 UTC
 TICKS_PER_S = 100_000
-NEW_STREAM_TICKS = 60 * TICKS_PER_S  # a stream not heard before may be this much behind the newest
+NEW_STREAM_TICKS = 60 * TICKS_PER_S  # a stream not received before may be this much behind the newest
 MOST_KEY_FILE_BYTES = 1024
 READ_BY_OTHERS = stat.S_IRGRP | stat.S_IROTH
 
@@ -87,7 +87,7 @@ def sign_outgoing(mav: Any, key: bytes, unix_s: float, *, link_id: int = 0) -> N
 class SignatureCheck:
     """The strict policy for what arrives: signed with the key, and newer than all of its stream before.
 
-    A stream that was not heard before may be a minute behind what is newest: the time now, or the newest stamp heard
+    A stream that was not received before may be a minute behind the newest time: now, or the newest stamp received
     (MAVLink 2 message signing, "Timestamp Handling"). So a fresh session takes nothing that was recorded earlier.
     clock: seconds that pass, from `unix_s` on. rejected counts by reason: `unsigned`, `bad_signature`, `replayed`. A
     forged packet changes nothing but a count.

@@ -1,4 +1,4 @@
-"""A bag as a Log: which messages are read, on one clock, and what is said of the choice. docs/reference/ros.md.
+"""A bag as a Log: which messages are read, on one clock, and the notes on the choice. docs/reference/ros.md.
 
 px4_msgs (https://github.com/PX4/px4_msgs) become the topics of a ULog: the same fields under the same names, so the
 same converters make streams of them. A topic's name is that of uORB behind /fmu/out/ (`uxrce_dds_client`), with the

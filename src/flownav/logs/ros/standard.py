@@ -107,7 +107,7 @@ def _gps(roles: dict[str, Gathered], clock: Clock) -> tuple[list[Stream], Origin
 
 
 def _nearest(topic: Gathered, clock: Clock, t_s: Array) -> Array:
-    """The velocity (NED) told nearest to each fix, NaN where none is within half the usual step."""
+    """The velocity (NED) nearest in time to each fix, NaN where none is within half the usual step."""
     told_s = clock.times(topic)
     order = np.argsort(told_s, kind="stable")
     told_s, velocity = told_s[order], ned(topic.column("vx", "vy", "vz"))[order]
@@ -120,7 +120,7 @@ def _nearest(topic: Gathered, clock: Clock, t_s: Array) -> Array:
 
 
 def limits_of(roles: dict[str, Gathered]) -> dict[str, tuple[float, float]]:
-    """What the rangefinder says of itself."""
+    """The range limits that the rangefinder states of itself [m]."""
     if "range" not in roles:
         return {}
     low, high = np.median(roles["range"].column("min_range", "max_range"), axis=0).tolist()
@@ -153,7 +153,7 @@ def battery_table(topic: Gathered, t_s: Array) -> Table | None:
 
 
 def path_table(topic: Gathered, t_s: Array) -> Table | None:
-    """Positions, and where they are told attitude and body velocity, in NED and FRD; None without two rows.
+    """Positions, and attitude and body velocity where they are given, in NED and FRD; None without two rows.
 
     Odometry's velocity is in its child frame, the body (nav_msgs/Odometry).
     """

@@ -18,7 +18,7 @@ LONGEST_S = 0.1  # a gap in the inertial readings is no longer than this
 
 
 class Memory(NamedTuple):
-    """The state, and when each sensor was heard last [s]. known: 1 with a fix, grounded: with a range."""
+    """The state, and the time of each sensor's last reading [s]. known: 1 with a fix, grounded: with a range."""
 
     pos_n: float = 0.0
     pos_e: float = 0.0

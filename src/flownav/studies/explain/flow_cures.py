@@ -1,4 +1,4 @@
-"""What cures a wrong setting of the flow sensor, or a picture that it cannot read."""
+"""Cures of a wrong setting of the flow sensor, or of a picture that it cannot read."""
 
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.cure import Cure, Settings, decimal, either, number, whole
@@ -43,7 +43,7 @@ def scale(case: Case, sign: Sign, dialect: str) -> Cure:
 
 
 def delay(case: Case, sign: Sign, dialect: str) -> Cure:
-    """The delay that the filter is told."""
+    """The flow delay to set in the autopilot's filter."""
     lag = number(sign, "lag_ms")
     reason = f"a reading is {lag:.0f} ms old when it arrives"
     return either(

@@ -68,7 +68,7 @@ def axes(case: Case) -> Found:
 
 
 def axes_words(angle: float, mirrored: bool, matrix: Array | None) -> str:
-    """What is wrong with the axes, in words; matrix: the response (2, 2), where it is known."""
+    """The error of the axes, in words; matrix: the response (2, 2), where it is known."""
     if mirrored:
         if matrix is None:
             return "they are mirrored: one is inverted, or the two are swapped"
@@ -201,7 +201,7 @@ def found_lag(case: Case) -> float | None:
 
 
 def delay(case: Case) -> Found:
-    """Older on arrival than the autopilot was told."""
+    """Finds flow that is older on arrival than the autopilot's parameter states."""
     if case.flow is None:
         return NO_FLOW
     lag = found_lag(case)

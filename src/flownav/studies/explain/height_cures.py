@@ -1,4 +1,4 @@
-"""What cures a height that follows something else than the height."""
+"""Cures of a height estimate that follows another quantity than the height."""
 
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.cure import Cure, Settings, decimal, either, number, whole

@@ -57,8 +57,8 @@ class Finding(NamedTuple):
 
 
 class Explanation(NamedTuple):
-    """What came of a log: the causes, the first one first; every hypothesis that was looked into; and what each of
-    the others would need that the log lacks.
+    """The explanation of a log: the causes, the first one first; every hypothesis that was checked; and the data that
+    each of the others needs and the log lacks.
     """
 
     log: str

@@ -1,4 +1,4 @@
-"""What cures GPS, compass and the choice among sources."""
+"""Cures of GPS, of the compass and of the choice among sources."""
 
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.cure import Cure, Settings, decimal, either, number, whole
@@ -11,7 +11,7 @@ HOVER_THROTTLE = 0.4
 
 
 def lag(case: Case, sign: Sign, dialect: str) -> Cure:
-    """The delay that the filter is told of GPS."""
+    """The GPS delay to set in the autopilot's filter."""
     late = max(number(sign, "lag_ms") - 200.0, 0.0)  # of its own velocity, which every receiver smooths
     reason = f"its velocity is {number(sign, 'lag_ms'):.0f} ms behind, of which a receiver smooths 200 ms away"
     return either(

@@ -147,7 +147,7 @@ class Mismatch(NamedTuple):
 
     @property
     def excess(self) -> float:
-        """What lies above sound, over all."""
+        """The sum of the amounts above 1, which is sound."""
         return sum(max(one - 1.0, 0.0) for one in self)
 
 
@@ -208,7 +208,7 @@ def _of_flow(case: Case, streams: Streams, run: Replay, attitude: Stream | None)
 
 
 def _of_height(case: Case, streams: Streams, run: Replay) -> float:
-    """The height's source as the autopilot was told; the barometer where nobody says."""
+    """Test ratio of the height's source set in the autopilot; of the barometer where none is set."""
     one = case.told.set_at(1)
     source = Sensor.RANGE if one is not None and one.height == RANGE else Sensor.BARO
     stream = streams.get(source)

@@ -1,6 +1,6 @@
-"""What may be tuned, a few settings each by a factor, and which windows of flights are fitted and which judge the fit.
+"""The settings that may be tuned, each by a factor, and which windows of flights are fitted and which judge the fit.
 
-Between two windows lies a gap, so that what lasts of an error in one is not found again in the next.
+Between two windows lies a gap, so that a lasting error in one is not found again in the next.
 """
 
 import math

@@ -23,7 +23,7 @@ REACH_M = 4.0  # up to here the range sensors of such vehicles hear their echo, 
 BEYOND_M = 6.0  # from here on none of the logs' range sensors can
 OUTLIER_M = 0.3  # of a range from the smoothed height
 LEAST_HIGH_S = 10.0
-BAROMETER_S = 60.0  # slower errors cannot be told from the smoothed altitude's own
+BAROMETER_S = 60.0  # slower errors cannot be distinguished from the smoothed altitude's own
 LATEST_FLOW_S, FLOW_STEP_S = 0.4, 0.01  # lags of the flow that are tried
 LEAST_ROWS = 100  # of flow in flight
 SLOW_SHARE = 0.1  # of the Nyquist frequency: below it white noise has a tenth of its power
@@ -59,7 +59,7 @@ class Smoothed:
 
 
 class FlowFit(NamedTuple):
-    """What of the flow is the velocity: gain, lag [s]; and what is not: robust deviation [rad/s], its colour."""
+    """The fit of the flow by the velocity: gain, lag [s]; and of its residual: robust deviation [rad/s], its colour."""
 
     gain: float
     lag_s: float

@@ -80,7 +80,7 @@ def astray(rows: Sequence[Row]) -> list[str]:
 
 
 def lacking(figure: str) -> str:
-    """What the simulator lacks, by the figure's name."""
+    """The effects that the simulator lacks, by the figure's name."""
     return next((words for beginning, words in LACKS if figure.startswith(beginning)), "")
 
 
@@ -131,7 +131,7 @@ the same paths, runs the same navigator on both, and sets the figures beside eac
   three readings of a unit of 100 Hz and more), receiver (in the log's steps), lidar where the log reads below 0.25
   m and else sonar, barometer, compass, and an autopilot's attitude with the errors of the paper's GPS/INS. Who is
   who is drawn by (seed, flight).
-- **Navigator.** `flownav replay` as it is shipped, told nothing of either, with the GPS outages of
+- **Navigator.** `flownav replay` as it is shipped, with no knowledge of either, with the GPS outages of
   `src/flownav/data/validation.toml`, each a replay of its own, with flow and without.
 - **Verdict.** *As flown*: the recorded figure is not more than {slack:g} times beyond the least and largest of the
   simulated flights. *Too kind*: it is worse than that; *too hard*: it is better. The exit status is 1 where the

@@ -169,7 +169,7 @@ class Recorder(Keeper):
 
 
 def told_every_second(recorder: Recorder, facts: Callable[[], dict[str, Any]]) -> Callable[[float], None]:
-    """A function that the loop calls with our clock: it writes the facts once a second, for a session that is killed."""
+    """A function called by the loop with our clock: writes the facts once a second, in case the session is killed."""
     at_s = [float("-inf")]
 
     def tell(now_s: float) -> None:

@@ -35,7 +35,7 @@ NAN = float("nan")
 
 
 class _Told(NamedTuple):
-    """The last content of a source, since when, when it was last taken, and the times from one content to the next [s]."""
+    """A source's last content, since when, when it was last taken, and the times between contents [s]."""
 
     content: tuple[float, ...]
     since_s: float

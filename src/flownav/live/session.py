@@ -95,7 +95,7 @@ class Session:
 
     # -- what arrives -----------------------------------------------------------------------------------------
     def take(self, piece: bytes, now_s: float, *, whole: bool) -> bool:
-        """Take bytes that arrived at `now_s`; True where a message of the vehicle is among them. `tick` does the rest."""
+        """Take bytes that arrived at `now_s`; True where the vehicle sent one of them. `tick` does the rest."""
         before = self.reception.received
         for message in self.reception.feed(piece, whole=whole):
             vehicle = self.reception.vehicle

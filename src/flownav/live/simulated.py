@@ -46,7 +46,7 @@ class Due(NamedTuple):
 
 
 class SimulatedVehicle:
-    """A flight as a list of messages. log: with an IMU, GPS, a skid switch and truth; its other sensors are sent, too."""
+    """A flight as a list of messages. log: with an IMU, GPS, a skid switch and truth; other sensors are sent too."""
 
     def __init__(self, log: Log, *, key: bytes | None = None, system: int = SYSTEM, boot_s: float = BOOT_S) -> None:
         self._log, self._key, self._boot_s = log, key, boot_s

@@ -212,7 +212,7 @@ def delay(case: Case) -> Found:
         return nothing(case.flight_s, lag_s=lag)
     late = (lag - told_s) / LATE_S if told_s is not None else lag / UNTOLD_LATE_S
     early = (told_s - lag) / (2.0 * EARLY_S) if told_s is not None else 0.0
-    was = "nothing" if told_s is None else f"{1e3 * told_s:.0f} ms"
+    was = "no value" if told_s is None else f"{1e3 * told_s:.0f} ms"
     figures: dict[str, float | str] = {"lag_ms": 1e3 * lag, "told": was}
     return Sign(max(late, early, 0.0), case.flight_s, figures, (expected_picture(case),))
 

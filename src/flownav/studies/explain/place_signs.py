@@ -79,7 +79,7 @@ def lag(case: Case) -> Found:
     strength = max(over, 0.0) / (LAG_S if told_s is not None else UNTOLD_LAG_S)
     figures: dict[str, float | str] = {
         "lag_ms": 1e3 * tie.lag_s,
-        "told": "nothing" if told_s is None else f"{1e3 * told_s:.0f} ms",
+        "told": "no value" if told_s is None else f"{1e3 * told_s:.0f} ms",
     }
     if case.gps_velocity is None or case.inertial_velocity is None:
         return nothing(case.flight_s, strength)

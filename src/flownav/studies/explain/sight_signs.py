@@ -155,7 +155,7 @@ def noise(case: Case) -> Found:
     window = (float(t_s[noisy[0]]), float(t_s[noisy[-1]])) if len(noisy) else case.flight_s
     figures: dict[str, float | str] = {
         "noise_rad_s": size, "usual_rad_s": float(np.median(jumps)),
-        "told": "nothing" if told is None else f"{told:.2f} rad/s",
+        "told": "no value" if told is None else f"{told:.2f} rad/s",
     }  # fmt: skip
     picture = Picture("flow (rad/s)", (
         Trace("flow", "flow x", t_s, seen[:, 0], dots=True), Trace("gps", "flow y", t_s, seen[:, 1], dots=True),

@@ -77,7 +77,7 @@ def _targets(made: list[Case]) -> str:
 
 
 def _known(made: list[Case]) -> str:
-    return _table(("case", "what the vehicle knows exactly"), [(case.name, case.known) for case in made])
+    return _table(("case", "known to the vehicle without error"), [(case.name, case.known) for case in made])
 
 
 def _consistency(made: list[Case], truth_model: str) -> str:

@@ -34,7 +34,7 @@ def one_line_error(done):
 
 
 def short(tmp_path, text="", name="landing", duration="2.0"):
-    """A short copy of a shipped scenario, handed over after half a second, with lines added to its end."""
+    """A short copy of a shipped scenario, with its hand-over after half a second, with lines added to its end."""
     path = tmp_path / "short.toml"
     original = shipped(f"{name}.toml").read_text(encoding="utf-8")
     soon = "\n[filter]\nhandover_s = 0.5\n"

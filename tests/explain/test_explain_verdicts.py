@@ -1,4 +1,4 @@
-"""Planted faults are named, sound flights are not, and what a log lacks is said."""
+"""Planted faults are named, sound flights are not, and missing data are reported."""
 
 from __future__ import annotations
 

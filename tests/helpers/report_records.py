@@ -93,7 +93,9 @@ def flight(scenario: str = "landing", seed: int = 1, gps_sigma_m: float = 0.3) -
 
 
 def navigated(seed: int = 1) -> Record:
-    """The landing on the navigator: its estimate of other instants than the truth's, 2 m off, and what was flown on."""
+    """The landing on the navigator: its estimate of other instants than the truth's, 2 m off, and the estimate used
+    by the autopilot.
+    """
     record = flight("landing", seed)
     truth, estimate = record.tables["truth"], record.tables.pop("estimate")
     t_s = 0.06 + np.cumsum(np.random.default_rng(seed).uniform(0.02, 0.03, 1900))

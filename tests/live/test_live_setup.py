@@ -536,7 +536,7 @@ def test_mistakes_are_one_line(options, said, tmp_path, monkeypatch):
 
 
 def test_a_gimbal_that_says_it_is_an_autopilot_is_not_written_to():
-    """It is heard first, a second before the autopilot."""
+    """It is received first, a second before the autopilot."""
     link = FakeLink(FakeAutopilot(ARDUPILOT, {"A": 1}))
     mav = coder(1, 154)
     link._to_us.append(bytes(mav.heartbeat_encode(2, ARDUPILOT, 0, 0, 4, 3).pack(mav)))

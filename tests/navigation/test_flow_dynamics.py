@@ -101,7 +101,9 @@ def flight_with(setup, *, lagged):
 
 
 def velocity_rms_m_s(flight):
-    """Horizontal velocity error of sixteen flights: where the navigator stands, and of now, as it is flown on."""
+    """Horizontal velocity error of sixteen flights: at the navigator's horizon, and at present, as the autopilot
+    uses it.
+    """
     buffers = buffers_of(flight, LANES, flight.plan.epochs, written=False)
     fly_into(flight, SEED, 0, LANES, buffers)
     names = ("vel_u_m_s", "vel_v_m_s")
@@ -164,7 +166,7 @@ def test_a_user_who_wants_no_states_gets_the_delay_back():
 # -- what is compiled -------------------------------------------------------------------------------------------
 @equation
 def mark(work, lanes, lag):
-    """What no compiler can type stands where only lagged lanes come."""
+    """A branch that no compiler can type stands where only lagged lanes come."""
     if lag is not None:
         work[0] = lanes.no_such_thing
     else:
@@ -282,7 +284,7 @@ def test_states_are_worth_something_where_a_delay_cannot_follow_and_nothing_wher
     ratio = {name: np.divide(delayed, lagged) for name, (delayed, lagged) in worth.items()}
     assert ratio["2 Hz, damping 0.7"] == pytest.approx([1.0, 1.0], abs=0.03)
     assert ratio["2 Hz, damping 1.5"][0] == pytest.approx(1.0, abs=0.03)  # at the horizon
-    assert ratio["2 Hz, damping 1.5"][1] > 1.2  # flown on
+    assert ratio["2 Hz, damping 1.5"][1] > 1.2  # at present
     assert min(ratio["0.5 Hz, damping 0.7"]) > 1.1
 
 

@@ -1,4 +1,4 @@
-"""Parts of somebody else's fly on the compiled loop as ours do: axioms, and every mistake told in one line."""
+"""Parts of somebody else's fly on the compiled loop as ours do: axioms, and every mistake reported in one line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the figures draw: thinning, moments, rotations, the radius of uncertainty, colours."""
+"""The figures' data: thinning, moments, rotations, the radius of uncertainty, colours."""
 
 from __future__ import annotations
 

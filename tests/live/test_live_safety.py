@@ -327,7 +327,7 @@ def test_while_a_fault_is_suspected_nothing_is_sent_and_the_screen_names_it():
     assert "suspected" not in shown(wire)
     wire.fly(12.0, beside=drift)
     assert "suspected: GPS drift north" in told["screen"]
-    assert "withheld: innovations tell of a sensor that fails" in told["screen"]
+    assert "withheld: innovations show that a sensor fails" in told["screen"]
     assert 12.0 < told["t_s"] < 20.0
     assert wire.estimates(told["t_s"] - 1.0)
     assert not wire.estimates(told["t_s"] + 0.02)

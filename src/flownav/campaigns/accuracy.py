@@ -208,7 +208,7 @@ def _ensemble_targets(asked: Requirement, judged: Judged, facts: dict[str, Any])
 
 
 def _cost(judged: Judged, whole: Judged) -> dict[str, Any]:
-    """A variant's figures, and the errors of what it flew on over those of the whole navigator."""
+    """A variant's figures, and the errors of the estimate in use over those of the whole navigator."""
     squares, wholes = judged.flown.root_mean_square() ** 2, whole.flown.root_mean_square() ** 2
     assert judged.sums is not None
     landings = touchdown_rows(judged.scores)

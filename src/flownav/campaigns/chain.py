@@ -119,7 +119,7 @@ def _read_checked(path: Path) -> Any:
 
 
 def _bytes_of(path: Path) -> bytes:
-    """A file's bytes. ValueError where it says of itself what cannot be; pyarrow ends the process at some of that."""
+    """A file's bytes. ValueError where its header states impossible sizes; pyarrow ends the process at some of them."""
     with an_input(path).open("rb") as file:
         data = file.read(MOST_PART_BYTES + 1)
     if len(data) > MOST_PART_BYTES:

@@ -45,7 +45,7 @@ WORTH_IT = 4096  # flights: fewer are drawn before other processes have started
 def truths_of(
     flight: Flight, seed: int, ensemble: Ensemble | None, faults: Callable[[int], SensorFault] | None = None
 ) -> Truths:
-    """Truths for `simulation.engine.fly_into`: what the sheets say or the ensemble draws, and each flight's fault."""
+    """Truths for `simulation.engine.fly_into`: the sheets' values or the ensemble's draws, and each flight's fault."""
 
     def packed(first: int, count: int) -> Array:
         if ensemble is not None:

@@ -147,7 +147,7 @@ PARTS_AHEAD = 2  # parts that wait for each core of the cluster
 
 
 class RayCluster:
-    """address: of the cluster; None: as RAY_ADDRESS says, else a new one on this machine. InputError without Ray."""
+    """address: of the cluster; None: RAY_ADDRESS, else a new one on this machine. InputError without Ray."""
 
     piece = 4 * len(LANES)  # a task
 

@@ -40,7 +40,7 @@ class Measure(NamedTuple):
 
     @property
     def of_landing(self) -> bool:
-        """Whether it says something only of flights that were to land."""
+        """Whether it applies only to flights that were to land."""
         return self.of_touchdown or self.name == NOT_LANDED
 
 

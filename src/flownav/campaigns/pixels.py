@@ -209,10 +209,10 @@ BANDS_M = (0.0, 0.3, 0.6, 1.2, 2.4, 4.8, 100.0)
 
 
 def agreement(frames: list[PixelFrame], sheet: PadCameraSheet) -> list[dict[str, Any]]:
-    """By height: what was found and how far off in the frames, beside what the datasheet says of the same frames.
+    """By height: the detections and their errors in the frames, next to the datasheet's values for the same frames.
 
     expected_found: by its chances, of the frames with the whole pad in view; *_rms: of errors with their bias, and
-    expected_*: noise and bias of the datasheet at the same heights and rates. None where there is nothing to tell.
+    expected_*: noise and bias of the datasheet at the same heights and rates. None where there is no frame.
     """
     p = sheet.parameters()
     rows = []

@@ -167,7 +167,7 @@ class Plan:
 
     @cached_property
     def as_json(self) -> dict[str, Any]:
-        """The campaign as its folder says it; two campaigns of the same are the same flights."""
+        """The campaign as written in its folder; two campaigns of the same are the same flights."""
         return {
             "schema_version": SCHEMA_VERSION,
             "flownav": __version__,

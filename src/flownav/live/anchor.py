@@ -19,7 +19,7 @@ from flownav.navigation.memory import PROTECTION, load_flow, load_gps, load_susp
 
 AGREED_S = 1.0  # chosen: ten readings of a flow of 10 Hz; held by test_live_recordings
 UNHELD_S = 2.0  # without a fix for so long the position is the flow's: chosen, two of a receiver of 1 Hz
-FLOW_S = 0.5  # an older flow reading says nothing of now: chosen
+FLOW_S = 0.5  # an older flow reading is no evidence of the present: chosen
 CAUSED_S = 3.0  # a suspicion that begins so soon after a doubt, or during one, is of what caused the doubt: chosen
 PLACES = ("flow_doubted", "fault_suspected", "unprotected", "uncertain")  # reasons that are of the place alone
 
@@ -76,7 +76,7 @@ class Anchor:
         return bool(suspicion.suspected == 0.0 or suspicion.suspected_s <= self._doubted_s + CAUSED_S)
 
     def move(self, on: Running, *, jumps: bool) -> None:
-        """Say it anew; a jump where no place was sent meanwhile."""
+        """Set the place again; a jump where no place was sent meanwhile."""
         self.moves += jumps
         suspicion = load_suspicion(on.work, ONE_LANE, 0)
         level_m = float(on.work[PROTECTION])

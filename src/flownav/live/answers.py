@@ -41,9 +41,9 @@ WITHHELD = {
     "position_invalid": "no horizontal aid for long: the position is invalid",
     "dead_reckoning": "no horizontal aid for too long",
     "unfused": "a horizontal sensor is received and not fused",
-    "fault_suspected": "innovations tell of a sensor that fails",
+    "fault_suspected": "innovations show that a sensor fails",
     "unprotected": "a sensor that fails unseen may have put the position too far off",
-    "origin_doubted": "the autopilot's origin is far from the fixes, and it does not say where it is in it",
+    "origin_doubted": "the autopilot's origin is far from the fixes, and its own position in it is not sent",
     "not_finite": "the estimate is not a finite number",
     "uncertain": "the position's standard deviation is too large",
     "too_fast": "the velocity's standard deviation is too large",
@@ -156,9 +156,9 @@ def fault_of(estimate: say.Estimate, limits: Limits, base: Base = NOTHING) -> st
 
 
 def as_relative(estimate: say.Estimate) -> say.Estimate:
-    """The accuracy of a place that dead reckoning tells: of where it is from where it was a second ago.
+    """The accuracy of a dead-reckoned place relative to the place of a second ago.
 
-    What has been lost since the start is lost for the autopilot as well, which follows this place and has no other. If
+    The error since the start is the autopilot's as well, which follows this place and has no other. If
     the whole of it were stated, its filter would take the place for bad, follow the velocity, and drift by itself.
     """
     assert estimate.pose_covariance is not None

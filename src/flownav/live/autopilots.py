@@ -17,15 +17,16 @@ NO_VEHICLES = {5, 6, 18, 26, 27, 30, 31, 32, 33, 34, 36, 37, 38, 39, 40, 41, 42,
 NONE, COMPONENT, VEHICLE, KNOWN = range(4)  # what a HEARTBEAT makes of its sender, the better later
 MOVES = ("HIGHRES_IMU", "RAW_IMU", "SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3", "ATTITUDE", "ATTITUDE_QUATERNION")
 PLACES = ("GPS_RAW_INT", "OPTICAL_FLOW", "OPTICAL_FLOW_RAD")
-TURN_S = 5.0  # to tell both: chosen; an autopilot that answers was asked for all within 2 s (test_live_recordings)
+TURN_S = 5.0  # to send both: chosen; an autopilot that answers was asked for all within 2 s (test_live_recordings)
 MOST = 64  # that are remembered: chosen
 
 
 def standing(component: int, kind: int, make: int, *, named: bool = False) -> int:
     """The standing of a sender by its HEARTBEAT; kind: MAV_TYPE, make: MAV_AUTOPILOT.
 
-    NONE: no autopilot. COMPONENT: it says so, with another component's number. VEHICLE: an autopilot by its number as
-    well. KNOWN: of a make whose streams we know. named: it was asked for by its number, which is enough.
+    NONE: no autopilot. COMPONENT: an autopilot by its type, with another component's number. VEHICLE: an autopilot
+    by its number as well. KNOWN: of a make whose streams we know. named: it was asked for by its number, which is
+    enough.
     """
     if make == INVALID_AUTOPILOT:
         return NONE
@@ -95,7 +96,7 @@ class Autopilots:
         serving = [one for one in heard if one.may_serve(now_s, taken=one is current)]
         if serving:
             best = max(serving, key=lambda one: (one.told == 2, one.standing, one.told, one is current))
-        else:  # of those that tell nothing one after the other is asked
+        else:  # of those that send neither one after the other is asked
             best = max(heard, key=lambda one: (one.told, one is current and one.told > 0, -(one.turn_s or 0.0)))
         if best is current:
             return None

@@ -30,7 +30,7 @@ class Asked(NamedTuple):
 class Backlog:
     """Bytes on their way to a reader, and whether an estimate may follow them.
 
-    Who has answered nothing yet is not judged. spells: how often a reader was found slow.
+    A reader that has not answered yet is not judged. spells: how often a reader was found slow.
     """
 
     def __init__(self) -> None:

@@ -183,7 +183,7 @@ def _streams(listened: EventQueue) -> dict[Sensor, Stream]:
 
 
 def own_declination_rad(streams: dict[Sensor, Stream]) -> float:
-    """Where nobody says where on earth the vehicle is: the bearing of the field by the autopilot's own attitude [rad].
+    """For a vehicle without a known place on earth: the bearing of the field by the autopilot's own attitude [rad].
 
     The frame that is sent is then the autopilot's, whatever its compass and its idea of north are. 0 without attitude.
     """

@@ -122,7 +122,7 @@ class Hearing:
         return reading._replace(value=self.field.restored((x, y, z), reading.t_s))
 
     def _compared(self, source: Source, vehicle: Vehicle, reading: Measurement, now_s: float) -> bool:
-        """An inertial reading, held against the others' where it is news; whether it says anything."""
+        """Whether an inertial reading may be used: new, and compared with the other sources'."""
         if self.repeats.is_crowded(source, reading.t_s):
             self.counts[f"imu: {CROWDED}"] += 1
             return False
@@ -166,7 +166,7 @@ class Hearing:
             self._reading(sample.reading, now_s)
 
     def _fix(self, message: Message, here_ned_m: Vector | None) -> None:
-        """A receiver is one that has had a fix (ArduPilot tells of one that it does not have); the first of all fixes
+        """A receiver is one that has had a fix (ArduPilot reports one that it does not have); the first of all fixes
         is where the vehicle is."""
         place = fix_deg_m(message)
         if message.fix_type < LEAST_FIX or place is None:

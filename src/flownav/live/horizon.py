@@ -15,7 +15,7 @@ from flownav.logs.mavlink.messages import PREFERENCE
 from flownav.navigation.reasons import HORIZONTAL, REFUSALS
 from flownav.navigation.rows import InnovationRow
 
-SILENT_S = 2.0  # a source that says nothing for so long gives way
+SILENT_S = 2.0  # a source that is silent for this long gives way
 # Chosen, and held by test_live_recordings: ArduPilot repeats a fix of 5 Hz at 10 Hz, its first copy up to 0.1 s old;
 # with a horizon that did not follow it, all fixes came too late on most starts.
 WINDOW_S = 5.0
@@ -28,7 +28,9 @@ GONE_S = 2.0  # a sensor without a message for this long is silent, which the sc
 
 
 class Source(NamedTuple):
-    """Who measured: message, instance, and whether the autopilot itself tells it (False: another component)."""
+    """The source of a reading: message, instance, and whether the autopilot itself sends it (False: another
+    component).
+    """
 
     message: str
     instance: int
@@ -56,7 +58,7 @@ class Sources:
         return found.source if found is not None else None
 
     def bar(self, sensor: Sensor, source: Source) -> None:
-        """This source must not serve any more; the next one that speaks does."""
+        """Bar a source from use; the next one that sends a reading takes its place."""
         self.barred.setdefault(sensor, set()).add(source)
         if self.chosen(sensor) == source:
             del self._chosen[sensor]
@@ -94,7 +96,7 @@ class Lags:
     """The greatest lag of each sensor's readings over the last 15 to 20 s, on the vehicle's clock.
 
     A reading's lag is the newest instant that any sensor has described, less its own. It holds the sensor's own delay,
-    the phase between a reading and the message that tells it, and what one message is faster on the link than another;
+    the phase between a reading and its message, and the difference of the messages' times on the link;
     a link that delivers in batches, or stands still, adds nothing, since it holds back all alike. One that is larger
     than `most_s` is not waited for.
     """
@@ -190,7 +192,7 @@ class Serving:
         self._landed = self._denied = False
 
     def alarms(self, t_s: float, after_s: float) -> dict[Sensor, Refused]:
-        """Sensors of which nothing was fused for `after_s` although they speak."""
+        """Sensors of which nothing was fused for `after_s` although they send readings."""
         return {
             sensor: spell
             for sensor, spell in self._spells.items()

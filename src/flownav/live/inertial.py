@@ -1,12 +1,12 @@
-"""Which of a vehicle's inertial sensors flies: one whose accelerometer is stuck gives way before it is believed.
+"""Choice among a vehicle's inertial sensors: one whose accelerometer is stuck is replaced before the navigator uses it.
 
-A stuck accelerometer is known by its content: it jumps, and then says the very same again and again while its gyro does
-not. Readings wait at the horizon for longer than that takes, so that those of the
-stuck one can be taken back, and another's put in their place, before the navigator has seen any.
+A stuck accelerometer is known by its content: it jumps, and then repeats one value while its gyro does not. Readings
+wait at the horizon for longer than that takes, so that those of the stuck one can be taken back, and another's put
+in their place, before the navigator has seen any.
 
-Two that differ and are both alive contradict each other. Of three the one that is alone errs; of two gravity is asked:
-a vehicle that holds its height feels it, on average; the one that does not feel it errs. One that is not believed is no
-witness against another until it has spoken as others do for a while.
+Two that differ and are both alive contradict each other. Of three the one that is alone errs; of two gravity
+decides: a vehicle that holds its height measures it, on average, and the sensor that does not measure it errs. A
+rejected sensor is no witness against another until it has agreed with others for a while.
 """
 
 import math
@@ -34,8 +34,8 @@ MOST_KEPT = 1024  # readings of a source: chosen, a second of 1 kHz
 BEFORE_S = 0.15  # readings shortly before that are wrong too: an autopilot smooths its readings; chosen
 RECOVERED_S = 0.3  # since it erred last, where none serves: chosen
 AGREED_S = 1.0  # likewise, where another serves: chosen
-HIGHER_M = 0.4  # a height that says so much more or less than expected, or is refused, is a witness: chosen
-TOGETHER_S = 0.5  # two that say so within this are of one mind: chosen
+HIGHER_M = 0.4  # a height that is higher or lower than expected by this, or is refused, is a witness: chosen
+TOGETHER_S = 0.5  # two that report so within this agree: chosen
 DOUBTED_S = 1.0  # for this long after they reported it: chosen
 UP = {(Sensor.RANGE, 0): 1.0, (Sensor.BARO, 0): 1.0, (Sensor.GPS_POSITION, 2): -1.0}  # sign of an innovation, up
 
@@ -170,17 +170,17 @@ class Inertial:
         )
 
     def recovered(self, source: Source, t_s: float, *, alone: bool) -> bool:
-        """Whether a source that erred speaks as one that does not. alone: none serves, so that nobody contradicts."""
+        """Whether a source that erred agrees with one that does not. alone: none serves, so that none contradicts."""
         heard = self._heard.get(source)
         return heard is not None and t_s - heard.erred_s >= (RECOVERED_S if alone else AGREED_S)
 
     def _alive(self, serves: Source, t_s: float, barred: Collection[Source]) -> list[_Heard]:
-        """Others that speak, are believed and are not stuck."""
+        """Other sources that send readings, are not barred and are not stuck."""
         believed = (heard for source, heard in self._heard.items() if source != serves and source not in barred)
         return [heard for heard in believed if heard.kept and t_s - heard.kept[-1].t_s <= LOOK_S and not heard.stuck]
 
     def _contradicted(self, serves: Source, t_s: float, barred: Collection[Source]) -> bool:
-        """Whether it is alone with what it says, or, of two, feels gravity less than the other."""
+        """Whether the source in use contradicts all others, or, of two, measures gravity less well than the other."""
         alive = self._alive(serves, t_s, barred)
         own = self._heard[serves].usual(t_s) if alive else None
         if own is None:
@@ -196,7 +196,7 @@ class Inertial:
 
 
 def differ(one: Usual | None, other: Usual | None) -> bool:
-    """Whether two accelerometers say what cannot both be."""
+    """Whether two accelerometers differ by more than chance allows."""
     if one is None or other is None:
         return False
     by_chance = math.hypot(one.by_chance, other.by_chance)
@@ -204,10 +204,10 @@ def differ(one: Usual | None, other: Usual | None) -> bool:
 
 
 class Heights:
-    """Range, barometer and GPS held against the height that the inertial sensors carry on.
+    """Compares range, barometer and GPS with the height that the inertial sensors carry on.
 
-    One alone may meet a step of the ground, a gust or a slow error. Two that say so together, and one of them so loudly
-    that the filter refuses it, are right: then neither height nor vertical velocity is sent.
+    One alone may meet a step of the ground, a gust or a slow error. Two that agree, one of them so far off that the
+    filter refuses it, are right: then neither height nor vertical velocity is sent.
     """
 
     def __init__(self) -> None:

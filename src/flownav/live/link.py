@@ -126,10 +126,10 @@ class Link:
         """Let go."""
 
     def believe(self, sender: Sender) -> None:
-        """The vehicle spoke from there: it is answered there, and nobody else is listened to."""
+        """Accept `sender` as the vehicle: answers go there, and no other sender is accepted."""
 
     def forget(self) -> None:
-        """The vehicle is silent: anyone may speak."""
+        """Accept any sender again: the vehicle is silent."""
 
 
 def waited(link: Link, seconds: float) -> None:
@@ -273,7 +273,9 @@ class Outgoing:
             self._others.append(frame)
 
     def flush(self, write: Callable[[bytes], int], now_s: float) -> int:
-        """Write what the pace and the port allow; write says how many bytes it took. How many went out."""
+        """Write as many frames as pace and port allow; write: returns how many bytes it took. Returns the number of
+        frames sent.
+        """
         self._earn(now_s)
         written = 0
         while self._rest or (self._credit > 0.0 and self._next()):

@@ -15,7 +15,7 @@ from flownav.logs.mavlink.outgoing import Estimate
 from flownav.navigation.loop import Running
 from flownav.navigation.reasons import HORIZONTAL
 
-RECENT_S = 1.0  # a range and a landed state that are older do not say where a navigator begins: chosen
+RECENT_S = 1.0  # an older range or landed state does not determine where a navigator begins: chosen
 HEIGHT_DOUBTED = "height_doubted"
 # Reasons that an unused sensor may cause.
 OUTRANKED = ("", "position_invalid", "dead_reckoning", "flow_doubted", "unprotected")
@@ -40,10 +40,10 @@ class Offering:
 
     @property
     def offset_ned_m(self) -> Vector:
-        """Of the navigator's origin in the frame that is sent [m].
+        """The navigator's origin in the frame that is sent [m].
 
-        One that begins in flight without GPS begins at 0, and is above the ground by what the range says: what is sent
-        is about the ground below, until an origin and a fix say more.
+        One that begins in flight without GPS begins at 0, and its height above the ground is the range: the sent
+        position is relative to the ground below, until an origin and a fix arrive.
         """
         north_m, east_m, down_m = self.hearing.origin.offset_ned_m
         unknown = not (north_m or east_m or down_m)
@@ -88,8 +88,9 @@ class Offering:
         self.alarms = found
 
     def _spoils(self, sensor: Sensor, t_s: float) -> bool:
-        """Whether a sensor that does not serve keeps the estimate from being sent: any that tells where the vehicle is,
-        but a GPS that is refused while the flow, which nobody doubts, agrees with the inertial sensors."""
+        """Whether a sensor that does not serve keeps the estimate from being sent: any that gives the position,
+        except a GPS that is refused while the flow, which nobody doubts, agrees with the inertial sensors.
+        """
         refused = self.alarms[sensor].why == Reason.INNOVATION_GATE.label
         return sensor in HORIZONTAL and not (sensor in GPS and refused and self.anchor.agrees(t_s))
 

@@ -17,10 +17,10 @@ class Limits:
     """Beyond any of these no estimate is sent.
 
     age_s: of the newest reading of the vehicle. dead_reckoning_s: of the newest horizontal aid that was fused, the
-    horizon's wait included; a vehicle that flies on the estimate moves on what it says, so this is short. sigma_m,
-    sigma_m_s: one standard deviation of horizontal position and velocity. protection_m: how far off the position may be
-    although no fault is noticed, the horizontal protection level. sigma_down_m: one of the height. unfused_s: for how
-    long a horizontal sensor may speak without being fused.
+    horizon's wait included; a vehicle that uses the estimate follows its errors, so this is short. sigma_m,
+    sigma_m_s: one standard deviation of horizontal position and velocity. protection_m: how far off the position may
+    be although no fault is noticed, the horizontal protection level. sigma_down_m: one of the height. unfused_s: for
+    how long readings of a horizontal sensor may arrive without being fused.
     """
 
     age_s: float = 0.3

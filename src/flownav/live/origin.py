@@ -80,7 +80,7 @@ class Origin:
         return "doubted" if known else "refused"
 
     def _is_doubtful(self, place: Geodetic, *, settled: bool) -> bool:
-        """Whether somebody else has to say the same before it is believed."""
+        """Whether another witness has to confirm the origin before it is used."""
         used = self._told or self.navigator_deg_m
         if self.navigator_deg_m is None or used is None:
             return False

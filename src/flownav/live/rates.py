@@ -1,9 +1,9 @@
-"""Which rates a link can carry: what the vehicle is asked for, and how often it is sent an estimate.
+"""The rates that a link can carry: of the requested streams, and of the estimates that are sent.
 
-A line that is asked for more than it carries does not say so: the autopilot's buffer fills, readings arrive later and
-later, and what does not fit is lost at random. So rates come down in the stated order until they fit, what the
-navigator rests on last: inertial readings, flow, range and GPS. A serial line carries a tenth of its baud rate in
-bytes.
+A line that is asked for more than it carries gives no error: the autopilot's buffer fills, readings arrive later and
+later, and frames that do not fit are lost at random. So rates come down in the stated order until they fit, those of
+the navigator's main sensors last: inertial readings, flow, range and GPS. A serial line carries a tenth of its baud
+rate in bytes.
 """
 
 from typing import NamedTuple
@@ -27,7 +27,7 @@ COMMON = {
 }
 STREAMS = {
     True: {"RAW_IMU": (27, 100), "OPTICAL_FLOW": (100, 50), **OTHER_IMU, **COMMON},  # ArduPilot
-    # PX4 says nowhere that it is simulated, and a vehicle has no truth to tell
+    # PX4 has no parameter that shows a simulator, and a vehicle has no truth to send
     False: {
         "SCALED_IMU": (26, 100),
         "HIGHRES_IMU": (105, 100),
@@ -181,7 +181,7 @@ class Rates:
     def heard(self, size: int, now_s: float, *, settled: bool = True) -> bool:
         """Note bytes that arrived. True where the line has been overfull: the streams are to be asked for anew, lower.
 
-        settled: the vehicle has been asked for all that is planned; before, what arrives says nothing of the plan.
+        settled: the vehicle has been asked for all planned streams; before, arriving bytes do not test the plan.
         """
         if self.capacity_bytes_s is None:
             return False

@@ -24,14 +24,16 @@ class Vehicle(NamedTuple):
 
 
 class Accepted(NamedTuple):
-    """Who beside the autopilot may tell a message: a system (None: the vehicle's) and a component of it (None: any)."""
+    """A sender other than the autopilot that may send a message: a system (None: the vehicle's) and a component of
+    it (None: any).
+    """
 
     message: str
     system: int | None = None
     component: int | None = None
 
 
-# sensors that companions and gimbals of the vehicle's own system tell: a camera, a flow sensor, a range finder
+# sensors that companions and gimbals of the vehicle's own system send: a camera, a flow sensor, a range finder
 BESIDE = tuple(map(Accepted, ("LANDING_TARGET", "OPTICAL_FLOW", "OPTICAL_FLOW_RAD", "DISTANCE_SENSOR")))
 
 
@@ -150,7 +152,7 @@ class Reception:
             self._others.add(who)
 
     def overhear(self, piece: bytes) -> None:
-        """A datagram of another address than the vehicle's: another autopilot may speak there."""
+        """Take note of a datagram from another address than the vehicle's: another autopilot may send there."""
         for frame, content in StreamFrames().feed(piece, whole=True):
             who = frame.system, frame.component
             wanted = all(wanted in (None, own) for wanted, own in zip(self._wanted, who, strict=True))
@@ -183,7 +185,7 @@ class Reception:
         return self.vehicle is not None and sender_of(message) == self.vehicle[:2]
 
     def _accepts(self, message_id: int, who: tuple[int, int]) -> bool:
-        """Whether a component that is not the vehicle's autopilot may tell a message."""
+        """Whether a component that is not the vehicle's autopilot may send a message."""
         assert self.vehicle is not None
         if who == (self.vehicle.system, self._own):
             return False

@@ -14,7 +14,7 @@ from flownav.core.measurement import Sensor
 from flownav.live.horizon import Source
 from flownav.logs.mavlink.framing import Message
 
-# Of which sensor a message tells, and what it says beside the time of sending; a time of measuring is content.
+# The sensor of each message, and its fields except the time of sending; a time of measuring is content.
 # ArduPilot's OPTICAL_FLOW has its filter's height in ground_distance, which is new in every copy.
 CONTENT: dict[str, tuple[Sensor, tuple[str, ...]]] = {
     "OPTICAL_FLOW": (Sensor.FLOW_RATE, ("flow_rate_x", "flow_rate_y", "flow_comp_m_x", "flow_comp_m_y", "quality")),

@@ -28,7 +28,7 @@ ORIGIN, GLOBAL_ORIGIN = "GPS_GLOBAL_ORIGIN", 49  # sent when it is requested, an
 
 
 class Truth(NamedTuple):
-    """The message that tells the truth: its name, number and the rate to ask for [Hz]."""
+    """The message with the truth: its name, number and the rate to ask for [Hz]."""
 
     name: str
     number: int
@@ -49,7 +49,7 @@ class Simulator:
         self._asked_s = float("-inf")
 
     def heard(self, message: Message, vehicle: Vehicle) -> Truth | None:
-        """The truth to ask for, where this message of the autopilot is the first to tell of a simulator."""
+        """The truth to ask for, where this message of the autopilot is the first sign of a simulator."""
         if self.truth is not None:
             return None
         name = message.msgname
@@ -84,8 +84,8 @@ class _Stream(NamedTuple):
 class Requests:
     """Commands to a vehicle, one after the other. answers counts them: `accepted`, `refused`, `unanswered`.
 
-    A stream that falls silent while the vehicle speaks is asked for again: after a reboot all rates are 0. One that was
-    refused is not, except the origin, which an autopilot has none of before its first fix.
+    A stream that falls silent while the vehicle sends others is requested again: after a reboot all rates are 0. One
+    that was refused is not, except the origin, which an autopilot has none of before its first fix.
     """
 
     def __init__(self, rates: Rates) -> None:

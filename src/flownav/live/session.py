@@ -2,7 +2,7 @@
 
 Bytes become messages of one vehicle (reception), these become measurements on the vehicle's clock (hearing), which wait
 on rings until all of their instant must be here, and are then fed to the navigator (filtering). Its state,
-carried on to now, is sent where nothing speaks against it (answers).
+carried on to now, is sent where no limit is exceeded (answers).
 """
 
 from collections import Counter, deque
@@ -63,7 +63,7 @@ class Session:
         self.outbox: deque[bytes] = deque(maxlen=1024)
         self.innovations: dict[tuple[int, int], tuple[float, float, int]] = {}  # innovation, test ratio, reason
         self._origin_kept: tuple[float, float, float] | None = None
-        self._vehicle_s = NAN  # our clock when the vehicle last spoke
+        self._vehicle_s = NAN  # our clock at the vehicle's last message
         self._sent_s = self._second_s = float("-inf")
 
     @property
@@ -271,7 +271,7 @@ class Session:
         return outcome.readings == BATCH_READINGS
 
     def _offer(self, t_s: float, now_s: float) -> None:
-        """Send the estimate of now, or what of it may be sent, or say why not."""
+        """Send the estimate of now, or its permitted part, or note why not."""
         vehicle = self.reception.vehicle
         assert vehicle is not None
         assert self.clock is not None

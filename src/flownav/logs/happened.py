@@ -17,7 +17,7 @@ SOURCE_SET = "source set"  # value: 1, 2, 3 of ArduPilot's EK3_SRCn
 FUSES_FLOW = "fuses flow"  # value: 1 where the autopilot's filter takes its flow, else 0
 CLIPPING = "clipping"  # value: accelerometer samples at the end of their range so far, all axes
 VIBRATION = "vibration"  # value: the vehicle's own level of its accelerometer's vibration [m/s2], in steps of 5
-MOST_ROWS = 2000  # of one kind: a log that tells more has little to say in each
+MOST_ROWS = 2000  # of one kind: a log with more has little information in each
 
 
 class Happened(NamedTuple):

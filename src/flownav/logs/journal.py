@@ -28,7 +28,7 @@ DTYPE = np.dtype("<f8")
 
 
 class Block(NamedTuple):
-    """A whole block: its number, what it says, and rows by name, each (n, columns)."""
+    """A whole block: its number, its entries, and rows by name, each (n, columns)."""
 
     number: int
     said: dict[str, Any]

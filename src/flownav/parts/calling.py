@@ -8,7 +8,7 @@ from typing import Any
 
 from flownav.core.errors import InputError
 
-LONGEST_NAME, LONGEST_SAID = 60, 400  # letters of a message; a compiler says pages
+LONGEST_NAME, LONGEST_SAID = 60, 400  # letters of a message; a compiler writes pages
 KINDS = {"p": ctypes.c_void_p, "q": ctypes.c_void_p, "d": ctypes.c_double, "i": ctypes.c_int64}
 
 
@@ -39,7 +39,7 @@ def telling(name: str) -> Iterator[None]:
 
 
 def words_of(mistake: BaseException) -> str:
-    """An exception in one line, its kind and what it says, if it can."""
+    """An exception in one line, its kind and its message, if it has one."""
     try:
         said = " ".join(str(mistake).split())
     except Exception:

@@ -84,7 +84,7 @@ def address_of(compiled: Unit, name: str) -> int:
         return compiled.address
 
 
-# the rows that simulator and tape read what a filter says from, field by field
+# the rows from which simulator and tape read a filter's estimate, field by field
 SAID_ROWS = (
     START,
     *range(STATE + POSITION, STATE + POSITION + 3),
@@ -178,7 +178,7 @@ class EquationFilter:
         return []
 
     def estimate(self) -> Estimate | None:
-        """The estimate, as `say` has it."""
+        """The estimate, from `say`."""
         said = self.say(self._now)
         if not said.known:
             return None

@@ -277,7 +277,7 @@ def replay_with(log: Log, options: ReplayOptions, settings: NavigatorSettingsFil
     try:
         flown = replay(log, options, settings, instead=instead)
     except InputError:
-        mistakes.tell()  # its own mistake says more than that it never started
+        mistakes.tell()  # its own exception is more informative than that it never started
         raise
     mistakes.tell()
     said = flown.said

@@ -183,7 +183,7 @@ class Flown(NamedTuple):
 class Controller(Protocol):
     """A controller in place of our autopilot's loops, called at 250 Hz.
 
-    When to take off, and that the vehicle has landed, stays with our landing logic, which says it as `flying`.
+    When to take off, and that the vehicle has landed, stays with our landing logic, which states it as `flying`.
     """
 
     def start(self, gains: AutopilotGains) -> None:

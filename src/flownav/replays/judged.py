@@ -35,11 +35,11 @@ TESTED = (Reason.FUSED, Reason.INNOVATION_GATE)
 MAY_BE_LEFT_OUT = ((Sensor.GPS_VELOCITY, 2), (Sensor.FLOW_VELOCITY, 2), (Sensor.PAD, 2))
 LEAST_READINGS = 20  # chosen: 4 s of a 5 Hz receiver
 LEAST_SHARE = 0.2  # chosen: a live session fuses the readings of its first two seconds, however late
-LATE = Reason.LATE.label  # what a live session's horizon left out never came to the navigator
+LATE = Reason.LATE.label  # readings that a live session's horizon left out never reached the navigator
 
 
 def airborne_of(log: Log) -> Window | None:
-    """From the first lift-off to the last touchdown [s]; None where nobody says."""
+    """From the first lift-off to the last touchdown [s]; None where the log does not show it."""
     if Sensor.LANDED in log.streams:
         landed = log.streams[Sensor.LANDED]
         flying = np.flatnonzero(landed.value[:, 0] < 0.5)
@@ -63,7 +63,7 @@ def airborne_of(log: Log) -> Window | None:
 
 
 def flying_at(log: Log, t_s: Array) -> NDArray[np.bool_]:
-    """Which instants (n,) lie in flight, stops on the ground between cut out; all where nobody says."""
+    """Which instants (n,) lie in flight, stops on the ground between cut out; all where the log does not show it."""
     window = airborne_of(log)
     if window is None:
         return np.ones(len(t_s), bool)
@@ -91,7 +91,7 @@ def obstacles(log: Log) -> list[str]:
 def consistency_scores(innovation: Array, landed: Stream | None = None) -> dict[str, dict[str, Any]]:
     """By sensor, of the components that were held against their prediction in flight; innovation: rows of a tape's.
 
-    landed: what says when it flies; all of it is flight without.
+    landed: the landed signal; without one all of it is flight.
     """
     offered = InnovationRow.of(innovation)
     tested = np.isin(offered.reason, TESTED)
@@ -120,7 +120,7 @@ def told(innovation: Array) -> Array:
 
 
 def reading_scores(innovation: Array, streams: Mapping[Sensor, Stream]) -> dict[str, dict[str, Any]]:
-    """By sensor, what became of whole readings, where `rejected` counts components; innovation: rows of a tape's.
+    """Counts of whole readings by sensor and outcome, where `rejected` counts components; innovation: rows of a tape's.
 
     offered to the filter; read: these and the rows that the reader threw away; fused: with every component, or with
     some of them (in_part); rejected: readings that lost one component or more, by reason, with the rows that the reader

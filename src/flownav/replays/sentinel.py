@@ -22,7 +22,7 @@ from flownav.logs.log import attitude_at, mean_over
 # spoilt copies is found out (test_replay_sentinel). Halving or doubling any one of them changes no verdict on nine such
 # parts and eleven copies, but for LEAST_OVERLAP, which beyond 1 silences all; that of the climb has but 40 intervals.
 MOVING_M_S = 1.0
-LEAST_MOVING_S = 10.0  # take-off and hover, 12 s of that log, say nothing
+LEAST_MOVING_S = 10.0  # take-off and hover, 12 s of that log, show nothing
 LEAST_MOVING_FOR_LAG_S = 20.0
 LEAST_PAIRS = 30
 SMOOTHING_S = 0.6

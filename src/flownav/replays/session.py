@@ -68,7 +68,7 @@ class Replay:
 
     @property
     def offered(self) -> InnovationRow[Array]:
-        """The columns of what became of each component."""
+        """The columns of the verdicts on each component."""
         return InnovationRow.of(self.innovation)
 
     @cached_property

@@ -205,7 +205,7 @@ def consistency_in(record: Record) -> dict[str, dict[str, Any]]:
 
 
 def _aloft(record: Record, t_s: Array) -> NDArray[np.bool_]:
-    """Which instants (n,) are in flight: by the truth of a simulated one, else by what its landed signal says."""
+    """Which instants (n,) are in flight: by the truth of a simulated one, else by its landed signal."""
     for name, column in (("truth", "on_ground"), ("landed", "landed")):
         table = record.tables.get(name, {})
         if column in table:

@@ -152,7 +152,7 @@ class Drift(NamedTuple):
 def drift_of(estimate: Motion, truth: Motion, flight_s: Window | None = None) -> Drift | None:
     """The error at the truth's instants of flight that both cover; None without such a flight.
 
-    flight_s: from when to when it flew; by the truth's height where nobody says.
+    flight_s: from when to when it flew; by the truth's height where it is not given.
 
     The truth is laid on the estimate at take-off, turned by the difference of headings there; without a heading of
     either by what fits the two paths best over the flight (least squares).

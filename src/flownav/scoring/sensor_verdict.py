@@ -13,11 +13,11 @@ MEANING = {
     "--settings, and errors that last are averaged less than it seems.",
     ACT: "the sensor is trusted too much, or does not fit the others: `flownav explain` looks for the cause; without "
     "one state a larger noise in --settings.",
-}  # what each of these says of an estimate's use, and what to do about it
+}  # the meaning of each verdict for the estimate's use, and the action to take
 
 
 def verdict(nis_per_dof: float, *, white: bool, refused: float = 0.0) -> str:
-    """A sensor in words: whether something must be done, and how large its errors are beside what the filter expects.
+    """A sensor in words: whether something must be done, and the ratio of its errors to the filter's expectation.
 
     refused: the share of its values, in flight, that lay outside the gate.
     """

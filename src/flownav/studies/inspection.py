@@ -1,4 +1,4 @@
-"""Inspection: a log in figures: its streams, clock, limits, what its sensors say of each other, what it lacks."""
+"""Inspection: a log in figures: its streams, clock, limits, agreement of its sensors, missing data."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -24,7 +24,7 @@ from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S
 from flownav.simulation.truth import SensorFault
 
-BEFORE_LANDING_S = 5.0  # that a fault begins, where the requirement does not say when
+BEFORE_LANDING_S = 5.0  # that a fault begins, where the requirement gives no time
 MOST_CELLS = 200
 
 

@@ -36,7 +36,7 @@ class Flown:
     """All flights of a certificate, one after the other: cell and number of each, (flights,).
 
     rows (flights, len(ROW_COLUMNS)); inputs: the dispersed numbers by name, (flights,), NaN in cells without one;
-    verdicts and limits: what became of each, and what limited it.
+    verdicts and limits: the outcome of each, and its limiting cause.
     """
 
     cell: NDArray[np.int64]

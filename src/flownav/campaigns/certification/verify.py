@@ -33,9 +33,9 @@ from flownav.report.campaign import render_certificate
 
 Found = Literal["holds", "does not hold", "not checked"]
 MOST_FACTS_BYTES = 256 << 20
-MADE_ANEW = ("worst", "flown_again")  # facts that hold more than what the rows alone say
+MADE_ANEW = ("worst", "flown_again")  # facts that need more than the rows
 RANKING_KEYS = ("ranking", "split")
-NEEDED = ("plan", "figures", "flights flown again")  # without these a folder can say whatever its maker likes
+NEEDED = ("plan", "figures", "flights flown again")  # without these a folder can hold anything
 NOT_LOOKED_AT = (
     ("flights of the ranking", "their outcomes are held by their hashes; they are not flown again"),
     ("records of the worst flights", "they are held by their hashes; `flownav report` reads them"),

@@ -37,7 +37,7 @@ AROUND_S = 35.0  # time for a go-around
 WITHIN_S = 1.0
 CONTACT_S = column_of("contact", "t_s")
 VERDICTS = ("landed", "went around", "crashed", "unfinished")
-# what the navigator says when something is wrong; starts, datums and standing still are no warnings
+# the navigator's warnings; starts, datums and standing still are none
 WARNINGS = {
     ("flow", "doubted"), ("filter", "dead_reckoning"), ("filter", "position_invalid"), ("imu", "lost"),
     ("imu", "doubted"), ("imu", "spike"), ("range", "stuck"), ("range", "reset"), ("gps", "reset"),
@@ -106,7 +106,7 @@ def flown_table(
 ) -> list[Row]:
     """Fly every fault at every height for every duration: rows by height, without a fault first.
 
-    matched: vehicle and sensors as their datasheets say; else each flight has a truth of its own.
+    matched: vehicle and sensors as in their datasheets; else each flight has a truth of its own.
     """
     rows = []
     for height_m in heights_m:
@@ -136,7 +136,7 @@ def _fly(
     """The scores of each flight."""
     ensemble = None if matched else setup.ensemble()
     flight = setup.flight._replace(fails=True)
-    assert setup.fitted is not None  # `BASE` flies on the navigator
+    assert setup.fitted is not None  # `BASE` uses the navigator
     assert flight.onboard is not None
     horizon_s, period_s = setup.fitted.schedule.horizon_s, flight.onboard.carried.flow_camera.clock.every * EPOCH_S
     for first in range(0, flights, len(LANES)):
@@ -197,7 +197,7 @@ def touched_s(history: Array, landing: Array, lane: int, t0_s: float) -> float:
 
 
 def first_warning(events: Array, t0_s: float, t1_s: float, horizon_s: float) -> float | None:
-    """When the navigator first says that something is wrong, in [t0, t1); rows of its tape, a horizon behind."""
+    """Time of the navigator's first warning in [t0, t1); rows of its tape, a horizon behind."""
     warnings = [t_s + horizon_s for t_s, kind, _ in events.tolist() if EVENT_NAMES[int(kind)][:2] in WARNINGS]
     return min((t_s for t_s in warnings if t0_s <= t_s < t1_s), default=None)
 

@@ -23,7 +23,7 @@ STAYS_S = 1.0
 SAME_S = 0.05  # happenings of two runs that lie no further apart are the same
 BY_COLUMN = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.RANGE,
              Sensor.BARO, Sensor.POSE, Sensor.PAD)  # component k observes column k  # fmt: skip
-FILTER = "filter"  # the source of what the navigator says of itself
+FILTER = "filter"  # the source of the navigator's own reports
 
 
 class FaultScores(NamedTuple):
@@ -193,7 +193,7 @@ def touchdown_error(course: Course, truth: Table) -> float | None:
 
 
 def unflagged(run: Navigated, course: Course, t0_s: float) -> float:
-    """The longest time from t0 on that the error is beyond 3 sigma before any event or flag says so."""
+    """The longest time from t0 on that the error is beyond 3 sigma before any event or flag."""
     said = np.array([event.t_s for event in run.events] + [flag.t0_s for flag in run.flags])
     longest = 0.0
     for first, last in _stretches(course.beyond & (course.t_s >= t0_s)):

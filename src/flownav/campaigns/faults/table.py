@@ -160,10 +160,10 @@ VALUE, VARIANCE = FED.index("value_0"), FED.index("variance_0")
 
 
 def log_of(record: Record, setup: Setup) -> Log:
-    """The log of a recorded flight of `setup`, with the flight's truth and what its autopilot flew on beside it.
+    """The log of a recorded flight of `setup`, with the flight's truth and the estimate that its autopilot used.
 
     Each stream states the age of its readings as the sensor's datasheet does. ValueError where the flight carries no
-    sensors of its own (it flew on the paper's filter).
+    sensors of its own (it used the paper's filter).
     """
     if "fed" not in record.tables or setup.fitted is None:
         raise ValueError("the flight has no sensors of its own; fly it on the navigator")

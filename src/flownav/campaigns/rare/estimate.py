@@ -138,7 +138,7 @@ def together_with(parts: list[Found]) -> tuple[float, float, float, float]:
 
 # -- all parts ---------------------------------------------------------------------------------------------------
 FEWEST_FLIGHTS, MOST_FLIGHTS = 2000, 100_000
-USUAL_FLIGHTS = 512  # that say what a usual touchdown is
+USUAL_FLIGHTS = 512  # that define a usual touchdown
 
 
 @dataclass(frozen=True)
@@ -236,8 +236,8 @@ def most_likely(
 ) -> tuple[Branch, float]:
     """The flight to look at, and its response: of the event's likelier part.
 
-    It is the one whose telling inputs are the most probable together; where no input tells anything, the one that the
-    event befell least.
+    It is the one whose ranked inputs are the most probable together; where no input is ranked, the one least far in
+    the event.
     """
     part = int(np.argmax([one.probability for one in found]))
     beyond = found[part].beyond

@@ -1,4 +1,4 @@
-"""`flownav live --setup`: meet the vehicle, read, compare, write where asked to, and say what is to be done."""
+"""`flownav live --setup`: meet the vehicle, read, compare, write where asked to, and report what is to be done."""
 
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,6 +1,6 @@
-"""A vehicle's parameters held against what flownav needs: rows, what blocks arming, and the serial port.
+"""A vehicle's parameters compared with those that flownav needs: rows, what blocks arming, and the serial port.
 
-The port that we speak over is found by its baud rate.
+The port in use is found by its baud rate.
 """
 
 from typing import NamedTuple
@@ -43,7 +43,7 @@ def baud_of(number: float) -> int:
 
 
 def port_of(family: str, values: dict[str, Value], baud: int) -> Port:
-    """The ports that speak MAVLink at our baud rate, and what is wanted of them."""
+    """The ports with MAVLink at our baud rate, and the values wanted for them."""
     return _serial(values, baud) if family == "SERIAL" else _instances(values, baud)
 
 

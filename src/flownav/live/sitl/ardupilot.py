@@ -59,7 +59,7 @@ class ArduPilot(Pilot):
         for _ in range(2):
             self.streams(STREAMS_HZ)
         if not self.wire.until(lambda: self.wire.history.truth, 10.0):
-            raise NotFlown("the simulator does not tell the truth (SIM_STATE)")
+            raise NotFlown("the simulator does not send the truth (SIM_STATE)")
         if case.gps == "never":
             self.wire.pump(6.0)
             self._origin()

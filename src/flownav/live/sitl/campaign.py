@@ -32,7 +32,7 @@ TARGETS = {"heli": "heli", "copter": "copter", "quad": ""}
 
 
 def program_of(autopilot: str, vehicle: str, given: Path | None) -> Path:
-    """The user's own simulator: given, of the environment, or on the PATH. InputError that says how one gets it."""
+    """The user's own simulator: given, of the environment, or on the PATH. InputError that explains how to get it."""
     variable, name = ENVIRONMENT[autopilot], PROGRAMS[vehicle]
     get = GET[autopilot].format(target=TARGETS[vehicle])
     if given is not None:

@@ -43,7 +43,7 @@ class FlowSensor:
         wire.turns.append(self.turn)
 
     def turn(self, now_s: float) -> None:
-        """Look at what truth has come, and tell what is due."""
+        """Look at the truth that has come, and send the readings that are due."""
         news = self._wire.history.truth[self._seen :]
         self._seen += len(news)
         for truth in news:
@@ -82,7 +82,7 @@ class FlowSensor:
 
 
 class Receiver:
-    """A second receiver of GPS, which speaks while its state says by how much it is off, and is good else."""
+    """A second GPS receiver, which sends fixes while its state has an error, off by that and otherwise good."""
 
     def __init__(self, wire: Wire, system: int) -> None:
         self.state = Eyes()
@@ -91,7 +91,7 @@ class Receiver:
         wire.turns.append(self.turn)
 
     def turn(self, now_s: float) -> None:
-        """Tell a fix where one is due."""
+        """Send a fix where one is due."""
         off_m = self.state.gps_north_m
         if off_m is None or now_s - self._said_s < FIX_S or not self._wire.history.truth:
             return

@@ -178,7 +178,7 @@ class _Flight:
             self.wire.kept = self.recording.take
 
     def flown(self) -> Flown:
-        """The whole of it, whatever becomes of it."""
+        """Fly the whole flight, and return its result however it ends."""
         why, landed = "", False
         try:
             landed = self.steps()

@@ -13,7 +13,7 @@ from flownav.logs.mavlink.position_messages import local_position_m
 GAP_S = 0.3  # a longer one between two estimates is one of sending
 WRONG_M = 1.0  # so far off, an estimate is wrong
 HIGH_M, TILTED = 0.5, 0.8  # landed is lower than this, and upright: the cosine of its tilt
-SETTLED_S = 3.0  # after a change of what the autopilot flies on
+SETTLED_S = 3.0  # after a change of the estimate in use
 NAN = float("nan")
 
 

@@ -26,9 +26,10 @@ class Eyes(ParameterModel):
 
 
 class Fault(ParameterModel):
-    """A fault: parameters while it is on and once it is off, and what the line, the machine or our own sensors do.
+    """A fault: parameters while it is on and once it is off, and the faults of the line, the machine or our own
+    sensors.
 
-    lasts_s: where `--fault` says nothing else. gps: whether it needs one. loss: share of frames lost each way;
+    lasts_s: unless `--fault` gives another. gps: whether it needs one. loss: share of frames lost each way;
     freeze_s: the simulator stands still for so long; restart: flownav is killed and started again.
     """
 
@@ -48,7 +49,7 @@ class Fault(ParameterModel):
 
 
 class Cases(ParameterModel):
-    """Parameters by what becomes of GPS, by vehicle, and of a landing on a pad; `all` in every flight."""
+    """Parameters by the use of GPS, by vehicle, and for a landing on a pad; `all` in every flight."""
 
     all: Parameters
     heli: Parameters = Field(default_factory=dict)

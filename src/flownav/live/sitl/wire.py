@@ -1,7 +1,7 @@
 """The two links of a simulated vehicle, on loopback: a ground station's, and a companion's, which is watched.
 
-One loop serves both: what the autopilot tells its companion goes on to flownav and back, frame by frame, with what the
-line does to it; estimates are noted as they leave, and what the ground station hears goes to who asks for it.
+One loop serves both: the autopilot's messages to its companion go on to flownav and back, frame by frame, with the
+line's faults; estimates are noted as they leave, and the ground station's messages go to all that ask for them.
 """
 
 import math
@@ -25,7 +25,7 @@ GCS, INVALID = 6, 8  # MAV_TYPE, MAV_AUTOPILOT
 BEAT_S, TURN_S = 0.1, 0.02  # of messages that are repeated; chosen
 ODOMETRY, SPEED, VISION = 331, 103, 102
 LARGEST = 65536
-STAMPED = 35  # SO_TIMESTAMPNS of Linux: the kernel says when a datagram arrived
+STAMPED = 35  # SO_TIMESTAMPNS of Linux: the kernel's time of a datagram's arrival
 NAN = float("nan")
 
 
@@ -76,8 +76,8 @@ class Line:
 class Wire:
     """The sockets of one flight.
 
-    station_peer: where the autopilot listens for a ground station; None: who speaks first. companion_port: where the
-    autopilot sends what is for its companion, 0 for any; live_port: where flownav listens.
+    station_peer: where the autopilot listens for a ground station; None: the first sender. companion_port: where the
+    autopilot sends to its companion, 0 for any; live_port: where flownav listens.
     """
 
     def __init__(self, live_port: int, companion_port: int = 0, station_peer: int | None = None, seed: int = 1) -> None:
@@ -129,7 +129,7 @@ class Wire:
             self.turn(min(left_s, TURN_S))
 
     def until(self, so: Callable[[], Any], limit_s: float) -> bool:
-        """Let time pass until something is so; whether it came."""
+        """Let time pass until `so()` is true; whether it came true."""
         end_s = time.monotonic() + limit_s
         while not so():
             if time.monotonic() >= end_s:

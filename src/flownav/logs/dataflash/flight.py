@@ -1,6 +1,6 @@
 """An ArduPilot DataFlash log (.bin) as a Log, with the autopilot's own estimate, a simulator's truth and parameters.
 
-docs/reference/dataflash.md says which messages are read and how.
+docs/reference/dataflash.md lists the messages that are read and how.
 """
 
 from pathlib import Path
@@ -60,7 +60,7 @@ def estimate_rows(log: DataFlash, settings: dict[str, float]) -> tuple[str, CsvT
 
 
 def _primary(log: DataFlash, name: str, table: CsvTable) -> Array:
-    """The core that flew at each row's time; the lowest one where the log does not say."""
+    """The core in use at each row's time; the lowest one where the log does not state it."""
     said = good_rows(log, name, (Field("PI", 0, 8),))
     if said is None:
         return np.full(len(table.t_s), table.columns["C"].min(initial=np.inf))
@@ -102,7 +102,7 @@ def truth(state: CsvTable, motion: CsvTable | None, origin: Origin) -> Table:
     """The truth at the times of SIM, about an origin.
 
     SIM2's position is finer than SIM's 1e-7 degrees but has the simulator's own origin: its median distance from
-    SIM's tells where that is.
+    SIM's gives that origin.
     """
     position = local_ned(state.matrix("Lat", "Lng", "Alt"), origin)
     velocity = np.full_like(position, np.nan)

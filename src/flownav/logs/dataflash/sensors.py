@@ -72,7 +72,7 @@ FIELDS: dict[str, tuple[Field, ...]] = {
 
 
 def sensor_rows(log: DataFlash, flow_instance: int | None, notes: list[str]) -> dict[str, CsvTable]:
-    """Good rows of every sensor that the log has, of one instance each; says which where there are several."""
+    """Good rows of every sensor that the log has, of one instance each, with a note where there are several."""
     tables = {}
     for name, fields in FIELDS.items():
         instance = _chosen(log, name, flow_instance)

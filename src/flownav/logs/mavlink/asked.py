@@ -28,7 +28,7 @@ class Asked:
         self._rows: dict[str, list[tuple[float, ...]]] = {name: [] for name in ASKING}
 
     def take(self, t_s: float, message: Message) -> None:
-        """A message of ASKING at its log time [s]; what says nothing is left out."""
+        """A message of ASKING at its log time [s]; a message without set-points is left out."""
         row = self._values(message)
         if math.isfinite(t_s) and row is not None:
             self._rows[message.msgname].append((t_s, *row))

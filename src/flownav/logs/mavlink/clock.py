@@ -26,7 +26,7 @@ CONFIRMATIONS = 3
 LONGEST_WAIT_S = 1.0  # an unstamped message follows its stamped predecessor by no more than this
 LONGEST_PAUSE_S = 86400.0  # arrivals further apart than this are a damaged arrival time
 CRYSTAL_DRIFT = 200e-6  # of one crystal against another
-SET_BACK_S, SET_FOR_S = 0.25, 1.0  # of another clock: all its stamps later by more, for so long, say that it was set
+SET_BACK_S, SET_FOR_S = 0.25, 1.0  # of another clock: all its stamps later by more, for this long, mean that it was set
 
 ClockName = tuple[int, int, str]  # system, component, "boot" or "unix"
 
@@ -122,7 +122,7 @@ def _laid(before: _Clock, clock: _Clock, now: float, reading: float) -> _Clock:
 
 
 def told_unix_time(state: ClockState, clock: ClockName, unix_s: float, boot_s: float) -> ClockState:
-    """SYSTEM_TIME says both times of one instant: the UNIX clock's offset is then known without any wait."""
+    """SYSTEM_TIME has both times of one instant: the UNIX clock's offset is then known without any wait."""
     reference = state.clocks.get(state.reference)
     if reference is None or unix_s * 1e6 < UNIX_FROM_US:
         return state

@@ -230,10 +230,10 @@ def landed(case: Case) -> Found:
     """Finds a landed state that is reported while the vehicle is in the air."""
     flag = case.stream(Sensor.LANDED)
     if flag is None:
-        return Lack("nothing says when it had landed")
+        return Lack("nothing reports when it had landed")
     flying = flag.t_s[flag.value[:, 0] < 0.5]
     if not len(flying):
-        return Lack("the flag never says that it flies")
+        return Lack("the flag never reports flight")
     grid = np.arange(max(case.flight_s[0], flying[0]), min(case.flight_s[1], flying[-1]), 0.05)
     if len(grid) < 20:
         return nothing(case.flight_s)

@@ -231,11 +231,11 @@ class Case(Aloft):
 
     # -- the autopilot -------------------------------------------------------------------------------------------
     def told_of(self, kind: str) -> list[tuple[float, float]]:
-        """When and what the log says of one kind."""
+        """Times and values of the log's events of one kind."""
         return [(row.t_s, row.value) for row in self.log.happened if row.kind == kind]
 
     def source_set_at(self, t_s: Array) -> Array:
-        """The number of EKF3's source set at instants; 1 until the log says another."""
+        """The number of EKF3's source set at instants; 1 until the log reports another."""
         switched = self.told_of(SOURCE_SET)
         times = np.array([-np.inf, *(t for t, _ in switched)])
         numbers = np.array([1.0, *(value for _, value in switched)])
@@ -243,7 +243,9 @@ class Case(Aloft):
 
     @cached_property
     def fused_share(self) -> float | None:
-        """The share of the flight in which the autopilot's filter took the flow; None where nobody says."""
+        """The share of the flight in which the autopilot's filter took the flow; None where the log does not report
+        it.
+        """
         said = self.told_of(FUSES_FLOW)
         if not said:
             return None
@@ -254,7 +256,7 @@ class Case(Aloft):
 
     @cached_property
     def clipped(self) -> float | None:
-        """How many accelerometer samples the vehicle counted as clipped until it landed; None where it says nothing."""
+        """How many accelerometer samples the vehicle counted as clipped until it landed; None where it reports none."""
         said = [(t, value) for t, value in self.told_of(CLIPPING) if t <= self.flight_s[1]]
         return said[-1][1] - said[0][1] if said else None
 

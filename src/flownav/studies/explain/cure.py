@@ -1,7 +1,7 @@
 """The cure of a cause: parameters of the log's own autopilot, each with its reason, and what to do by hand.
 
 A parameter is computed from the log's content and the sign's figures. Where no parameter can cure a cause, none is
-made up: the words say what to do.
+made up: the text states what to do.
 """
 
 from collections.abc import Callable

@@ -1,7 +1,7 @@
 """Signs of the flow sensor's settings: its axes, scale, delay, clock and gyro.
 
 Two witnesses that no reference is needed for: flow turns as the vehicle turns, at once and by the same angle, and its
-quick part is that of the accelerometer's integral over the range. Where GPS tells a velocity, that is a third.
+quick part is that of the accelerometer's integral over the range. Where GPS gives a velocity, that is a third.
 """
 
 import itertools
@@ -36,7 +36,9 @@ def _significance(fit: Fit | None, of: int = 1) -> float:
 
 # -- axes ----------------------------------------------------------------------------------------------------------
 def turned(case: Case) -> tuple[float, bool, float]:
-    """The flow's turn [rad], whether it mirrors, and how many standard errors say so: of all witnesses the surest."""
+    """The flow's turn [rad], whether it mirrors, and its significance in standard errors: by the surest of all
+    witnesses.
+    """
     if _significance(case.flow_fit) > SIGNIFICANT and case.flow_fit is not None:
         angle, _, mirrored = turn_of(case.flow_fit.matrix)
         return angle, mirrored, _significance(case.flow_fit)

@@ -50,7 +50,7 @@ def reach(case: Case) -> Found:
             Trace("truth", "range", t_s, range_m, dots=True),
             Trace("estimate", "other heights", grid, height_m),
         ),
-        "Above its reach the rangefinder says nothing.",
+        "Above its reach the rangefinder gives no reading.",
     )
     return Sign(harm * seconds / MISSING_S, window, figures, (picture,))
 

@@ -144,7 +144,7 @@ def _begin(explained: Explanation, span_s: Window) -> float:
 def _section(number: int, one: Finding, span_s: Window) -> Section:
     rank = "First cause" if number == 0 else "Another cause"
     panels = tuple(panel(one, place, picture, span_s) for place, picture in enumerate(one.pictures))
-    none = (Panel(f"{one.name}-none", one.title, absent="There is nothing to draw: the parameters say it."),)
+    none = (Panel(f"{one.name}-none", one.title, absent="There is nothing to draw: the parameters show it."),)
     return Section(one.name, f"{rank}: {one.title}", panels or none)
 
 

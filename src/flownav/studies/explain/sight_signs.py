@@ -164,12 +164,12 @@ def noise(case: Case) -> Found:
 
 
 def _news(values: Array) -> Flags:
-    """Which rows (n,) of columns are no repetition of the one before: a link may tell a reading twice."""
+    """Which rows (n,) of columns are no repetition of the one before: a link may send a reading twice."""
     return np.concatenate([[True], (np.diff(values, axis=0) != 0.0).any(axis=1)])[: len(values)]
 
 
 def _second(values: Array) -> Array:
-    """Second differences of columns (n, 2), of white noise as large as it is."""
+    """Second differences of columns (n, 2), scaled to have the size of white noise itself."""
     second = np.zeros_like(values)
     second[1:-1] = (values[2:] - 2.0 * values[1:-1] + values[:-2]) / np.sqrt(6.0)
     return second

@@ -56,7 +56,7 @@ class Told(NamedTuple):
 
     @property
     def takes_flow(self) -> bool | None:
-        """Whether any source set takes flow; None where nothing says."""
+        """Whether any source set takes flow; None where no parameter states it."""
         return any(one.flow for one in self.sets) if self.sets else None
 
     def set_at(self, number: int) -> SourceSet | None:

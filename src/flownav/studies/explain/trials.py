@@ -139,7 +139,7 @@ def gps_in_time(case: Case, sign: Sign) -> Repair:
 
 # -- scores ------------------------------------------------------------------------------------------------------
 class Mismatch(NamedTuple):
-    """How far what sensors say lies from a path, over what sound ones do, squared and capped; 1 is sound."""
+    """Distance of the sensors' readings from a path, over that of sound ones, squared and capped; 1 is sound."""
 
     flow: float
     height: float
@@ -158,9 +158,7 @@ def tried(case: Case, sign: Sign, repairing: Repairing | None) -> Trial:
     log's own heading, the height of its source, GPS as it comes.
     """
     if repairing is None:
-        return Trial(
-            "nothing to replay: what the parameters and the log say decides", None, drift(case, case.base, sign)
-        )
+        return Trial("nothing to replay: parameters and log decide", None, drift(case, case.base, sign))
     repair = repairing(case, sign)
     run = case.replayed(repair.streams, repair.options)
     if run is None:

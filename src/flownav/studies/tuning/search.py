@@ -1,6 +1,6 @@
 """The best factors on the fit windows, one knob after the other, and how sure each of them is; and the verdict.
 
-Do the proposed settings help on windows that the fit never saw? The bootstrap says how surely.
+Do the proposed settings help on windows that the fit never saw? The bootstrap gives the confidence.
 """
 
 import math

@@ -1,4 +1,6 @@
-"""docs/explanation/validation.md: what the figures say of the simulator, in words and as a page without a date."""
+"""docs/explanation/validation.md: the meaning of the figures for the simulator, in words and as a page without a
+date.
+"""
 
 from collections.abc import Sequence
 
@@ -36,8 +38,8 @@ MEANINGS = (
 
 # by the beginning of a figure's name: what the simulator lacks where it is too kind
 LACKS = (
-    ("range_beyond_reach", "A range sensor that hears no echo stays silent in the simulator; the recorded ones go on "
-     "reporting something near. That is a change of the sensor's equation and not made."),
+    ("range_beyond_reach", "A range sensor that receives no echo stays silent in the simulator; the recorded ones go "
+     "on reporting something near. That is a change of the sensor's equation and not made."),
     ("range_outlier", "Recorded outliers are more frequent and come in runs; the simulated echoes are single."),
     ("range", "In flight, ranges have outliers and correlated errors; in the simulator they are cleaner."),
     ("baro", "The barometer's error is one of seconds, by wash and gusts; the simulated one is white noise on a slow "
@@ -103,7 +105,7 @@ def number(value: float | None) -> str:
 
 
 def verdicts(rows: Sequence[Row]) -> str:
-    """How many figures say what, in one sentence."""
+    """The counts of the verdicts, in one sentence."""
     counts = {
         verdict: sum(row.verdict == verdict for row in rows) for verdict in ("as flown", TOO_KIND, TOO_HARD, OTHER)
     }

@@ -127,7 +127,7 @@ def _touchdowns(made: list[Case], truth_model: str) -> str:
 
 
 def _over_stated(made: list[Case]) -> str:
-    """Which state's error is larger or smaller than the navigator says."""
+    """The table of states whose error is larger or smaller than the navigator states."""
     rows = [
         (case.name, model, *_ratios(getattr(case, model)["error_over_stated"]))
         for case in made for model in TRUTH_MODELS

@@ -1,4 +1,6 @@
-"""`flownav build` and `verify`: the navigator as a library for other processors, and what it says there compared."""
+"""`flownav build` and `verify`: the navigator as a library for other processors, and its output there compared with
+replay.
+"""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -62,7 +64,7 @@ def _show(place: Path, facts: dict[str, Any]) -> None:
         f"Code {facts['code_bytes'] / 1000:.1f} kB, constants {facts['constant_bytes'] / 1000:.1f} kB, settings "
         f"{facts['settings_bytes'] / 1000:.1f} kB; RAM of a navigator {facts['navigator_bytes'] / 1000:.1f} kB"
     )
-    typer.echo(f"README.md says how it is used; `flownav verify {place}` looks at it again")
+    typer.echo(f"README.md explains its use; `flownav verify {place}` looks at it again")
 
 
 def verify(
@@ -71,7 +73,7 @@ def verify(
     horizon: Annotated[float | None, option("S", HORIZON, unset="0.27, or the folder's", within=(0.0, 1.0))] = None,
     as_json: options.Json = False,
 ) -> None:
-    """Replay a flight here, and compare it with what a board or a browser says, to the first difference."""
+    """Replay a flight here, and compare it with the output of a board or a browser, to the first difference."""
     from flownav.api.building import verify as compared
 
     facts = compared(what, record, horizon_s=horizon)

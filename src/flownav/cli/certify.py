@@ -147,7 +147,7 @@ def _fly(asked: Requirement, plan: Plan, how: How, name: str, folder: Path) -> d
 
 
 def _verify(folder: Path, requirement: str | None, again: int, key: Path | None, as_json: bool) -> None:
-    """Look a certificate's folder through, and say what holds. VerdictError where something does not."""
+    """Check a certificate's folder, and print what holds. VerdictError where something does not."""
     from flownav.campaigns.certification.verify import verify
     from flownav.campaigns.engines import Local
 
@@ -213,7 +213,7 @@ def _unit(one: dict[str, Any]) -> str:
     return "" if one["tolerance_bound"] is None else str(one["unit"])
 
 
-WIDEST_INDEX = 0.5  # an index whose interval is wider says nothing
+WIDEST_INDEX = 0.5  # an index whose interval is wider shows nothing
 
 
 def _index(row: dict[str, Any], name: str) -> str:

@@ -14,7 +14,7 @@ from flownav.core.errors import InputError, VerdictError
 if TYPE_CHECKING:
     from flownav.api.flying import Flights
 
-CRASHES_ALLOWED = 0.05  # of the flights, before the exit status says that the verdict is bad
+CRASHES_ALLOWED = 0.05  # of the flights, before the exit status reports a bad verdict
 
 
 GPS = "GPS errors: white noise as in the paper, or a receiver of 2 m CEP."

@@ -131,7 +131,7 @@ def _many_lines(landing: dict[str, Any]) -> list[str]:
 
 
 def _landed_lines(landing: dict[str, Any], landed: int, flights: int) -> list[str]:
-    """How many flights landed, and what became of the others."""
+    """Number of landings, and the outcomes of the other flights."""
     rate, around = landing["success"], landing["went_around"]
     share = f"(95 % interval {100.0 * rate['low']:.1f}..{100.0 * rate['high']:.1f} %)"
     said = [f"landed  {landed} of {flights} flights, {100.0 * rate['rate']:.1f} % {share}"]

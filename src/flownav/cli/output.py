@@ -213,7 +213,7 @@ def plain_look(*, edge: bool = True) -> dict[str, Any]:
 def say(*things: Any, wide: int = 0, soft: bool = False) -> None:
     """Print tables and lines. soft: long lines are not broken.
 
-    On a terminal, and where COLUMNS says how wide one is, tables fit its width; into a file or a pipe things have
+    On a terminal, and where COLUMNS gives a width, tables fit its width; into a file or a pipe things have
     `wide` columns at least.
     """
     from rich.console import Console

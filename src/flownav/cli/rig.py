@@ -132,7 +132,7 @@ def sample(
         return
     for note in notes:
         typer.echo(f"Note: {note}")
-    typer.echo(f"{folder / 'README.txt'} says what each holds.")
+    typer.echo(f"{folder / 'README.txt'} describes each.")
 
 
 def _list(*, as_json: bool) -> None:
@@ -152,7 +152,7 @@ def _facts_written(written: list[Written]) -> list[dict[str, Any]]:
 
 
 def _quiet(written: Written) -> None:
-    """A listener who says nothing beside the JSON object."""
+    """A listener that prints nothing next to the JSON object."""
 
 
 def _show_written(written: Written) -> None:

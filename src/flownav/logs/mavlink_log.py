@@ -221,7 +221,9 @@ class Flight:
 
 
 def find_vehicle(decoder: Decoder, frames: list[Frame]) -> tuple[Vehicle, list[str]]:
-    """The autopilot whose HEARTBEAT says so and that sent the most; without one, who sent the most. And notes."""
+    """The sender of autopilot's HEARTBEATs with the most frames; without one, the sender of the most frames. And
+    notes.
+    """
     sent = Counter((frame.system, frame.component) for frame in frames)
     makes = {
         (frame.system, frame.component): int(message.autopilot)

@@ -31,7 +31,7 @@ MOST_COLUMNS = 256
 def read_live_record(path: Path, *, flow_instance: int | None = None) -> Log:
     """Read a record that `flownav live --record` or `flownav fly` wrote.
 
-    InputError where it cannot be read, says not what a navigator was fed, or a flow instance is asked for.
+    InputError where it cannot be read, does not hold the input of a navigator, or a flow instance is asked for.
     """
     if flow_instance is not None:
         raise InputError(
@@ -45,7 +45,7 @@ def log_of_record(path: Path, record: Record) -> Log:
     kind = str(record.manifest.get("kind"))
     if kind not in KINDS or "fed" not in record.tables:
         raise InputError(
-            f"{path}: a record of kind {kind!r} that does not say what a navigator was fed; `flownav live --record` "
+            f"{path}: a record of kind {kind!r} without the input of a navigator; `flownav live --record` "
             "and `flownav fly` write one that does"
         )
     try:

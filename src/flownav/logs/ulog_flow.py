@@ -42,7 +42,7 @@ def flow_topic(path: Path, topics: Topics, instance: int | None) -> Topic | None
 
 
 def flow_stream(topics: Topics, topic: Topic) -> Stream:
-    """Rates of the flow and of the sensor's gyro (NaN where it has none), as old as PX4 says they are."""
+    """Rates of the flow and of the sensor's gyro (NaN where it has none), with the age that PX4 states."""
     dt_s = _integration_s(topic)
     quality = np.nan_to_num(topic.columns.get("quality", np.full(len(topic), 255.0)))
     flow, gyro = _accumulated(topic)

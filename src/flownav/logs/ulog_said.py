@@ -25,7 +25,7 @@ CLIPPING_S = 1.0
 
 
 def happened(topics: Topics) -> tuple[Happened, ...]:
-    """Everything that the topics and the logged strings tell, in order of time."""
+    """All events in the topics and the logged strings, in order of time."""
     told = ((t_s - topics.start_s, text) for t_s, text in topics.messages)
     return in_time([*_states(topics), *messages(told)])
 

@@ -23,7 +23,7 @@ LONGEST_DELAY_S = 1.0  # a sample older than this on arrival carries a wrong tim
 
 @dataclass
 class Topic(Rows):
-    """One instance of a topic. t_s: when it was published; column `sample_s`, where there, when it was so."""
+    """One instance of a topic. t_s: when it was published; column `sample_s`, where there, when it was sampled."""
 
     name: str = ""
     instance: int = 0
@@ -75,8 +75,8 @@ class Topic(Rows):
 class Topics:
     """The wanted topics of a file, parameters, and what was wrong with the file.
 
-    start_s: what the file's clock shows at time 0 of the topics. system: who says that it wrote the log. messages:
-    logged strings with the file's own time [s].
+    start_s: what the file's clock shows at time 0 of the topics. system: the name of the system that wrote the log.
+    messages: logged strings with the file's own time [s].
     """
 
     found: list[Topic]

@@ -1,4 +1,4 @@
-"""The figures of a campaign's page and of an envelope's, from what its summary says and where its flights touched."""
+"""The figures of a campaign's page and of an envelope's, from its summary and its flights' touchdowns."""
 
 from collections.abc import Sequence
 from itertools import pairwise

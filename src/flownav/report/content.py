@@ -32,7 +32,7 @@ def title(record: Record) -> str:
 
 
 def duration_s(record: Record) -> float:
-    """The flight's length [s]: as the manifest says, or else as its estimate lasts."""
+    """The flight's length [s]: by the manifest, or else of its estimate."""
     stated = record.manifest.get("duration_s")
     start, end = series.whole_s(record)
     return float(stated) if isinstance(stated, (int, float)) else end - start
@@ -129,7 +129,7 @@ def tiles(record: Record) -> list[Tile]:
 
 
 def _axis_of_largest(scores: Mapping[str, Any]) -> str:
-    """Which axis of the position erred most, as words to follow; "" where the scores do not say."""
+    """Which axis of the position erred most, as words to follow; "" where the scores lack it."""
     states = mapping(scores.get("states"))
     errors = {words: mapping(states.get(key)).get("max_error") for key, words in AXES.items()}
     known = {words: float(value) for words, value in errors.items() if isinstance(value, int | float)}

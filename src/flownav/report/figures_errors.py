@@ -43,7 +43,7 @@ def close_ups(record: Record) -> list[Panel]:
         panels.append(position(record, View("outage-position", "GPS outage: position", window)))
         panels.append(velocity(record, View("outage-velocity", "GPS outage: velocity", window)))
     if not panels:
-        why = "The record tells of no lift-off, no touchdown and no GPS outage."
+        why = "The record shows no lift-off, no touchdown and no GPS outage."
         panels.append(Panel("no-moments", "Take-off and landing", absent=why))
     return panels
 
@@ -157,7 +157,9 @@ def landing_errors(record: Record, moment: Moment, window: Window) -> list[Panel
 
 
 def flown_errors(record: Record) -> list[Panel]:
-    """Errors of what an autopilot flew on, the estimate of now from where the pad is taken to be; none without."""
+    """Errors of the estimate used by the autopilot at present, relative to the believed place of the pad; none
+    without.
+    """
     panels = []
     for columns, titles, what, _ in ERRORS:
         error = _error_of(record, "flown", columns)
@@ -165,7 +167,7 @@ def flown_errors(record: Record) -> list[Panel]:
             return []
         figure = _drawn(record, "flown", titles, error).chart(series.start_end_s(record), moments(record))
         title = f"Autopilot's input: {what} error"
-        caption = "Until the hand-over the vehicle stands, or flies on the truth: no error, by definition."
+        caption = "Until the hand-over the vehicle stands, or the autopilot uses the truth: no error, by definition."
         panels.append(Panel(f"flown-{what}-error", title, caption, f"{title} over time: {', '.join(titles)}.", figure))
     return panels
 

@@ -86,7 +86,7 @@ def scene_of(record: Record) -> Scene | None:
 
 
 def _numbers(said: Mapping[str, Any], names: Sequence[str]) -> dict[str, float]:
-    """Those of the names that say a finite number: a manifest comes from a file."""
+    """The finite numbers among these entries: a manifest comes from a file."""
     found = {name: said.get(name) for name in names}
     return {name: float(value) for name, value in found.items() if isinstance(value, int | float) and isfinite(value)}
 

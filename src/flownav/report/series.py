@@ -59,7 +59,7 @@ def track(record: Record, table: str, columns: tuple[str, ...]) -> Track | None:
 
 
 def estimates(record: Record, columns: tuple[str, ...]) -> list[tuple[str, str, Track]]:
-    """Everything that says these states, as (role, name, track), the truth last and so on top."""
+    """All tables with these states, as (role, name, track), the truth last and so on top."""
     names = dict(ESTIMATES) | {"truth": truth_name(record)}
     found = [(role, name, track(record, role, columns)) for role, name in names.items()]
     return [(role, name, source) for role, name, source in found if source is not None]

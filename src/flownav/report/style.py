@@ -44,7 +44,7 @@ PALETTE: dict[str, tuple[str, str]] = {
     "gps": ("#bf5b0b", "#f2a354"),
     "flow": ("#0e7a5f", "#45cfa2"),
     "autopilot": ("#8339a8", "#cb9df2"),
-    "flown": ("#8339a8", "#cb9df2"),  # what an autopilot flew on: its own estimate, too
+    "flown": ("#8339a8", "#cb9df2"),  # the estimate used by an autopilot: its own, too
     "imu": ("#7a6000", "#d8bf5a"),
     "command": ("#57616c", "#a3adb8"),
     "gate": ("#b8232a", "#ff8078"),

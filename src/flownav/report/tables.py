@@ -134,7 +134,7 @@ def text(value: Any) -> str:
 
 
 def command(record: Record) -> str:
-    """The command line that made the record, "" where it does not say."""
+    """The command line that made the record, "" where it does not hold it."""
     stated = record.manifest.get("command")
     if isinstance(stated, (list, tuple)):
         return shlex.join(str(part) for part in stated)

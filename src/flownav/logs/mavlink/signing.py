@@ -1,4 +1,4 @@
-"""MAVLink 2 signing: who holds the 32-byte key may speak; nothing else is listened to.
+"""MAVLink 2 signing: only frames signed with the 32-byte key are accepted.
 
 A signature is the first 6 bytes of SHA-256 over the key, the frame and a time stamp: 48 bits of 10 microseconds
 since 1 January 2015. A stream (link, system, component) must always move on in time, or an old packet could be
@@ -59,7 +59,7 @@ def load_key(path: Path) -> bytes:
 
 
 def _warn_of_readers(path: Path, mode: int) -> None:
-    """Who holds the key commands the vehicle; Windows tells nothing of that in the mode."""
+    """Warn of a key that other users can read: it commands the vehicle. Windows does not show this in the mode."""
     if os.name == "posix" and mode & READ_BY_OTHERS and path not in _told:
         _told.add(path)
         print(f"flownav: {path}: other users can read this signing key; chmod 600 keeps it yours", file=sys.stderr)

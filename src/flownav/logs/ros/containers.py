@@ -31,7 +31,7 @@ LARGEST_ATTACHMENT, LARGEST_DEFINITION, MOST_CHANNELS = 16 << 20, 1 << 20, 65536
 
 
 class Damage(Exception):
-    """A record that cannot be what it says."""
+    """A record that contradicts its own header."""
 
 
 class _Walk:

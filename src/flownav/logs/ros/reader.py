@@ -165,7 +165,7 @@ def _ros_log(
     )
     asked_for, battery = roles.get("setpoint"), roles.get("battery")
     if "range" in roles:
-        choice.append(f"range {roles['range'].topic} is taken to look down: its message does not say where it looks")
+        choice.append(f"range {roles['range'].topic} is taken to look down: its message does not state a direction")
     return Log(
         path, streams, origin, truth, inputs, (*notes, *choice, *clock_notes, *strays),
         own, roles["autopilot"].topic if own is not None else "", standard.limits_of(roles),

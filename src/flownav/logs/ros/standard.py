@@ -27,7 +27,7 @@ def streams_of(roles: dict[str, Gathered], clock: Clock) -> tuple[list[Stream], 
 
 
 def _imu(roles: dict[str, Gathered], clock: Clock) -> list[Stream | None]:
-    """Rates and specific force; the orientation as an attitude, where the message says that it has one."""
+    """Rates and specific force; the orientation as an attitude, where the message has one."""
     topic = roles.get("imu")
     if topic is None:
         return []
@@ -130,7 +130,8 @@ def limits_of(roles: dict[str, Gathered]) -> dict[str, tuple[float, float]]:
 def asked_table(topic: Gathered, t_s: Array) -> Table:
     """Positions that the autopilot was to hold, as its local frame has them; a component that was left open is NaN.
 
-    mavros_msgs/PositionTarget: ENU, since mavros turns MAVLink's (setpoint_raw.cpp); a bit of `type_mask` says: ignore.
+    mavros_msgs/PositionTarget: ENU, since mavros turns MAVLink's (setpoint_raw.cpp); a bit of `type_mask` means:
+    ignore.
     """
     place = topic.column("x", "y", "z")
     if topic.kind == TARGET:

@@ -68,7 +68,7 @@ VALUES_READ: dict[str, Values] = {kind: attrgetter(*columns.values()) for kind, 
 
 @dataclass
 class Gathered:
-    """One topic's messages: when each was logged and what its header says [ns], and its numbers."""
+    """One topic's messages: when each was logged and its header's stamp [ns], and its numbers."""
 
     topic: str
     kind: str
@@ -125,7 +125,7 @@ def values_of(kind: str, message: Any) -> tuple[float, ...]:
 
 # -- which topic serves -------------------------------------------------------------------------------------
 class Role(NamedTuple):
-    """A role that a topic may serve in. kinds: types that can; likely, unlikely: words in its name that speak for it,
+    """A role that a topic may serve in. kinds: types that can; likely, unlikely: words in its name that suggest it,
     or that rule it out unless it is asked for; named: only topics with a likely word.
     """
 

@@ -55,7 +55,7 @@ from navigation_streams import fly, navigate
 
 SEED = 5
 SETTLED = 500  # epochs
-# m/s (docs/explanation/landing-filter.md): sixteen gusty landings, at the horizon and flown on, with delay or states
+# m/s (docs/explanation/landing-filter.md): sixteen gusty landings, at the horizon and at present, with delay or states
 IN_LANDINGS = {
     "2 Hz, damping 0.7": ((0.0205, 0.0224), (0.0207, 0.0225)),
     "2 Hz, damping 1.5": ((0.0217, 0.0306), (0.0216, 0.0235)),
@@ -270,7 +270,7 @@ def worth(tmp_path_factory):
         setup = setup_with(folder, name)
         found[name] = [velocity_rms_m_s(flight_with(setup, lagged=lagged)) for lagged in (False, True)]
         off, chosen = phase_off_delay_deg(setup.sensor.dynamics), needs_lag_states(setup.sensor)
-        figures = " | ".join(f"{then:.4f}, flown on {now:.4f}" for then, now in found[name])
+        figures = " | ".join(f"{then:.4f}, at present {now:.4f}" for then, now in found[name])
         print(f"| {name} | {off:.1f}° | {'states' if chosen else 'delay'} | {figures} |")
     return found
 

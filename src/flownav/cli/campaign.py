@@ -30,7 +30,7 @@ MODELS = "Each flight's vehicle, wind and sensors drawn, as the datasheets say, 
 FOLDER = f"The folder; {options.KEPT}"
 FLIGHT = "Fly this flight again and write its record: K, CELL:K, or --rare's rare_flight.json."
 RARE = 'How probable this is, to 1e-6: "touchdown.horizontal_m > 1", "crash".'
-Scenarios = Annotated[list[str], argument("SCENARIO", "The flight", *SCENARIOS, beside="a scenario's FILE.toml")]
+Scenarios = Annotated[list[str], argument("SCENARIO", "The scenario", *SCENARIOS, beside="a scenario's FILE.toml")]
 Flights = Annotated[int | None, option("N", FLIGHTS_OF, unset="1000; with --until or --rare 100000")]
 Out = Annotated[Path | None, out_option(FOLDER, "out/SCENARIO_campaign; with --rare SCENARIO_rare")]
 

@@ -182,7 +182,7 @@ LOG_KINDS = "a CSV folder, .ulg, .bin, .tlog, or a record (.fnr)"
 Log = Annotated[Path, named("LOG", f"A log: {LOG_KINDS}.")]
 Logs = Annotated[list[Path], named("LOG", f"Logs, each {LOG_KINDS}.")]
 Record = Annotated[Path, named("RECORD.fnr", "A record, as fly, replay and live write it.")]
-Scenario = Annotated[str, argument("SCENARIO", "The flight", *SCENARIOS, beside="a scenario's FILE.toml")]
+Scenario = Annotated[str, argument("SCENARIO", "The scenario", *SCENARIOS, beside="a scenario's FILE.toml")]
 
 
 def out_option(what: str, default: str = "") -> Any:

@@ -61,7 +61,7 @@ COLUMNS = (
 def command(
     autopilot: Annotated[str, argument("AUTOPILOT", "Whose simulator", *options.AUTOPILOTS[::-1])],
     vehicle: Annotated[str | None, chosen("Which vehicle.", *VEHICLES, unset="heli, of PX4 quad")] = None,
-    scenario: Annotated[str, chosen("The flight.", *SCENARIOS)] = "square",
+    scenario: Annotated[str, chosen("The scenario.", *SCENARIOS)] = "square",
     gps: Annotated[str | None, chosen("The use of GPS.", *GPS, unset="the scenario's")] = None,
     fault: Annotated[list[str] | None, option("NAME@T[+S]", FAULT)] = None,
     flights: Annotated[int, option("N", "Flights of each row.", within=(1, 10_000))] = 1,

@@ -136,7 +136,7 @@ def _over_stated(made: list[Case]) -> str:
 
 
 def _could_be(made: list[Case]) -> str:
-    """The table of the share of time in the consistency band that a filter can reach with its stated covariance."""
+    """The shares of steps in the consistency band: as stated, and with the covariance scaled once or at each step."""
     shares = ("anees_inside_fraction", "anees_inside_fraction_sized", "anees_inside_fraction_sized_at_each_step")
     rows = [
         (case.name, model, f"{facts['anees']:.2f}", *(figure(facts[share], ".2f") for share in shares))

@@ -206,7 +206,7 @@ def _of_flow(case: Case, streams: Streams, run: Replay, attitude: Stream | None)
 
 
 def _of_height(case: Case, streams: Streams, run: Replay) -> float:
-    """Test ratio of the height's source set in the autopilot; of the barometer where none is set."""
+    """Mismatch of the height's source that is set in the autopilot; of the barometer where none is set."""
     one = case.told.set_at(1)
     source = Sensor.RANGE if one is not None and one.height == RANGE else Sensor.BARO
     stream = streams.get(source)

@@ -1,4 +1,4 @@
-"""What `import flownav` costs a fresh interpreter, and what the first use of a name of the API costs."""
+"""The time of `import flownav` in a fresh interpreter, and of the first use of a name of the API."""
 
 from __future__ import annotations
 

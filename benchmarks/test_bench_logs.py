@@ -37,7 +37,7 @@ def tiled(tmp_path_factory) -> Path:
 
 
 def pymavlink_columns(path: Path) -> dict[str, dict[str, np.ndarray]]:
-    """What a user of DFReader does to get arrays."""
+    """Arrays read as a user of DFReader reads them."""
     log = DFReader_binary(str(path))
     rows: dict[str, list[list[float]]] = {name: [] for name in MESSAGES}
     labels: dict[str, list[str]] = {}

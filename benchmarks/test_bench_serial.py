@@ -2,7 +2,7 @@
 
 Run with `python -m pytest benchmarks/test_bench_serial.py -s`; FLOWNAV_SERIAL_BENCH_S sets how long each line is flown
 (30 s, the first five of which do not count). The line is a pseudo-terminal whose far end is paced each way, with a
-buffer of 1 kB (tests/helpers/serial_line.py); the vehicle is the flight of `pad_return`, told in real time. `as asked
+buffer of 1 kB (tests/helpers/serial_line.py); the vehicle is the flight of `pad_return`, sent in real time. `as asked
 before` is the same line without a plan: everything is asked for, and every estimate is sent.
 """
 

@@ -43,7 +43,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """What is collected is no garbage: left out of every later search."""
+    """Leave collected objects, which are no garbage, out of every later search."""
     gc.collect()
     gc.freeze()
 

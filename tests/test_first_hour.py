@@ -1,4 +1,4 @@
-"""What a newcomer meets of one flight says one thing: README, first tutorial, terminal and report."""
+"""One flight has one set of figures in README, first tutorial, terminal and report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""What the pages tell a reader to type exists: commands with their options, targets of make, files of tests."""
+"""Everything that the pages ask a reader to type exists: commands with their options, targets of make, files of
+tests.
+"""
 
 from __future__ import annotations
 

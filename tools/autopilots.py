@@ -1,4 +1,5 @@
-"""The table of real autopilots flown on flownav, printed into its page: `flownav sitl` of each case, or of each fault.
+"""The table of real autopilots that fly on flownav's estimate, printed into its page: `flownav sitl` of each case,
+or of each fault.
 
 Flies what the folder does not hold, in real time, some three minutes each; the simulators are found as `flownav sitl`
 finds them. `--as-flown` prints what is there.
@@ -35,7 +36,9 @@ FAULTY = ("--scenario", "hover", "--gps", "cut", "--fault", "all@10")
 def fly(folder: Path, flights: int, beside: int, *, faults: bool) -> None:
     """Fly what is asked for and not there yet."""
     cases = [(vehicle, FAULTY) for vehicle in VEHICLES] if faults else CASES
-    for number in range(beside, flights + 1, beside):  # so many of each, then as many again, whenever it is stopped
+    for number in range(
+        beside, flights + 1, beside
+    ):  # the same number of each, then as many again, whenever it is stopped
         for vehicle, options in cases:
             name = "-".join([vehicle, *options[1::2]]).replace("@", "-")
             command = ["sitl", VEHICLES[vehicle], "--vehicle", vehicle, *options, "--out", str(folder / name)]

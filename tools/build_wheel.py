@@ -48,7 +48,7 @@ def _function(kernel: Path) -> str:
 
 
 def left_out(kernel: Path, temporary: Path) -> bool:
-    """Whether a kernel names a folder of this machine, as one that may raise NumPy's errors does: said, not shipped.
+    """Whether a kernel names a folder of this machine, as one that may raise NumPy's errors does: printed, not shipped.
 
     Who installs the wheel compiles it at its first use.
     """

@@ -1,8 +1,8 @@
-"""What is run so that its kernels go into a wheel: the commands, as short as they can be, in the folder given.
+"""Runs the commands whose kernels go into a wheel, as short as they can be, in the folder given.
 
     python tools/commands_for_wheel.py FOLDER
 
-`FLOWNAV_CACHE` and `FLOWNAV_LEVEL` say where the kernels are kept and for which processor.
+`FLOWNAV_CACHE` and `FLOWNAV_LEVEL` name the folder of the kernels and their processor.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What the code for a CUDA device is: `python tools/cuda_code.py` prints a table, and needs no GPU.
+"""Sizes of the code for a CUDA device: `python tools/cuda_code.py` prints a table, and needs no GPU.
 
-For each filter: how long numba-cuda, NVVM and NVIDIA's assembler take, how large the code is, and what the assembler
-says of registers, stack and spills. It needs the extra `gpu`.
+For each filter: how long numba-cuda, NVVM and NVIDIA's assembler take, how large the code is, and the assembler's
+report on registers, stack and spills. It needs the extra `gpu`.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class Compiling:
 
 
 def assembled(ptx: str) -> tuple[str, int]:
-    """What the assembler says, and the size of its machine code."""
+    """The assembler's report, and the size of its machine code."""
     assembler = pathfinder.find_nvidia_binary_utility("ptxas")
     with tempfile.TemporaryDirectory() as folder:
         source, code = Path(folder) / "flight.ptx", Path(folder) / "flight.cubin"

@@ -69,7 +69,7 @@ def scenarios() -> dict[str, Scenario]:
 
 
 def flight_digest(scenario: Scenario, lanes: tuple[int, ...], *, dispersed: bool) -> str:
-    """What a block of flights wrote: history, estimates, innovations, events and readings."""
+    """Digest of a block of flights: history, estimates, innovations, events and readings."""
     setup = assemble(scenario)
     flown = fly_written(setup.flight, SEED, 0, lanes, setup.ensemble() if dispersed else None)
     tape = flown.tape
@@ -78,7 +78,7 @@ def flight_digest(scenario: Scenario, lanes: tuple[int, ...], *, dispersed: bool
 
 
 def replay_digest(path: Path) -> str:
-    """What the navigator wrote of a log, forward and, where it can be, smoothed."""
+    """Digest of the navigator's rows of a log, forward and, where possible, smoothed."""
     try:
         log = open_flight(path)
         options, settings = as_fed(log, ReplayOptions(), None)

@@ -30,7 +30,7 @@ simulators, flown by [`flownav sitl`](../how-to/sitl.md) on flownav's estimate (
 square of 10 m), their faults, and their own DataFlash and ULog logs; one flight of each. Nothing but the log is
 read.
 
-What is right here is no blind figure: the rules were mended by what was wrong at the first look.
+The share that is right here is no blind figure: the rules were mended by what was wrong at the first look.
 
 * **ArduPilot**: at the first look 13 of 17 first causes, and nothing named of 4 of 6. A range that ends near the
   ground is not out of reach, a compass that goes off in flight while the filter keeps its heading is named, the
@@ -38,7 +38,7 @@ What is right here is no blind figure: the rules were mended by what was wrong a
   flown again since, by a build whose GPS comes in steps of 0.4 m north and 0.65 m east: 17 of 17 and 6 of 6 before
   any rule was changed for them. `range-noise` came later.
 * **PX4**: at the first look 13 of 15 first causes, and nothing named of 1 of 5. A gyro's response lies between two
-  regressions, drag goes by the speed that is heard at the time. Two faults were planted anew: a reversed flow
+  regressions, drag goes by the speed that is received at the time. Two faults were planted anew: a reversed flow
   turned with the vehicle as if it were not, and a parameter was set back before the log ended. PX4 1.17 has no
   deadlock of the height.
 
@@ -70,7 +70,7 @@ def flights() -> list[Flight]:
 
 
 def named(log: Path) -> tuple[str, ...]:
-    """What is named of a log, the first cause first."""
+    """The named causes of a log, the first cause first."""
     return tuple(one.name for one in explain(open_log(log)).findings)
 
 

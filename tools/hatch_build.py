@@ -1,4 +1,4 @@
-"""What hatchling asks for when it builds a wheel: what comes along that no folder of the source holds.
+"""The hook that hatchling calls when it builds a wheel: it adds files that no folder of the source holds.
 
 Plotly's script, which draws the pages of campaigns, certificates and comparisons: taken, with its licence, from
 Plotly's own package, so that who installs flownav need not install that (65 MB). Compiled kernels, if `FLOWNAV_KERNELS`

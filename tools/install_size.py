@@ -1,4 +1,4 @@
-"""What an installation weighs, distribution by distribution: `python tools/install_size.py SITE-PACKAGES`.
+"""The size of an installation, distribution by distribution: `python tools/install_size.py SITE-PACKAGES`.
 
 Blocks on the disk as `du` counts them, compiled Python (`.pyc`) among them, in MiB; pip and setuptools, which every
 environment has before flownav comes, stand apart.

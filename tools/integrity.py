@@ -1,4 +1,5 @@
-"""Protection levels on trial: flights with a failing sensor, and how often the error is above the level unsaid.
+"""Protection levels on trial: flights with a failing sensor, and how often the error is above the level without a
+warning.
 
 Flights are those of `campaigns.faults.table`; the error is that of the estimate at its own instants, from the fault's
 begin on. `make integrity` writes them as a table into a page: python tools/integrity.py PAGE
@@ -78,13 +79,13 @@ class Judged(NamedTuple):
 
     @property
     def above(self) -> NDArray[np.bool_]:
-        """(n, 2): whether the error is above the level unsaid; a level that is no number protects from nothing."""
+        """(n, 2): error above the level without a warning; a level that is no number protects from nothing."""
         found: NDArray[np.bool_] = ~(self.error_m <= self.level_m) & ~self.said[:, None]
         return found
 
 
 class When(NamedTuple):
-    """When errors are above the level unsaid, for faults of one duration; pairs are horizontal and vertical.
+    """When errors are above the level without a warning, for faults of one duration; pairs are horizontal and vertical.
 
     beyond: flights in which they ever are. unsaid: share of all steps. shares: of those steps, while the fault lasts,
     in the AFTERWARDS_S after it, and later.
@@ -99,7 +100,7 @@ class When(NamedTuple):
 
 
 class Row(NamedTuple):
-    """What came of all flights with one fault; pairs are horizontal and vertical.
+    """The result of all flights with one fault; pairs are horizontal and vertical.
 
     raised: share of flights in which each warning was raised. said: share of steps at which any stands. unsaid: share
     of steps at which the error is above the level and none stands. beyond_m: by how much it is above, at most. ratio,
@@ -194,7 +195,9 @@ def rows_of(flights: Iterable[Judged]) -> list[Row]:
 
 
 def whens_of(flights: Iterable[Judged]) -> list[When]:
-    """A row a fault and duration, in the order flown, of those whose error is ever above the level unsaid."""
+    """A row for each fault and duration, in the order flown, of those whose error is ever above the level without a
+    warning.
+    """
     grouped: dict[tuple[str, float], list[Judged]] = {}
     for flight in flights:
         grouped.setdefault((flight.fault, flight.lasts_s), []).append(flight)
@@ -236,7 +239,7 @@ BEGIN, END = "<!-- make integrity: begin -->", "<!-- make integrity: end -->"
 WHEN_BEGIN, WHEN_END = "<!-- make integrity, when: begin -->", "<!-- make integrity, when: end -->"
 HEADINGS = (
     "fault", "flights", "suspected [% of flights]", "warning stands [% of steps]",
-    "above the level unsaid, horizontal [‰ of steps]", "vertical [‰]", "at most above [m]", "vertical [m]",
+    "above the level without a warning, horizontal [‰ of steps]", "vertical [‰]", "at most above [m]", "vertical [m]",
     "level / error, median", "vertical", "level, median [m]", "vertical [m]",
 )  # fmt: skip
 
@@ -264,7 +267,7 @@ def section(rows: Sequence[Row], long: Sequence[Row], seeds: tuple[int, int], co
 
 WHEN_HEADINGS = (
     "fault", "lasts [s]", "flights", "ever above, horizontal", "vertical",
-    "above unsaid, horizontal [‰ of steps]", "vertical [‰]",
+    "above without a warning, horizontal [‰ of steps]", "vertical [‰]",
     "of these while it lasts / 10 s after / later, horizontal [%]", "vertical [%]",
 )  # fmt: skip
 
@@ -309,8 +312,9 @@ TOLD_EVERY = 1000  # flights
 
 
 def main(page: Path, seeds: int | None = None, faulty_seeds: int | None = None) -> None:
-    """Fly, print and write; with `seeds` the last table, of so many, and the others only where `faulty_seeds` says of
-    how many, with four times as many without a fault. FlownavError where the page has no place.
+    """Fly, print and write; with `seeds` the last table, of this number of flights, and the others only where
+    `faulty_seeds` gives their number, with four times as many without a fault. FlownavError where the page has no
+    place.
     """
     text = page.read_text(encoding="utf-8")
     placed(placed(text, "", str(page)), "", str(page), WHEN_BEGIN, WHEN_END)
@@ -338,7 +342,7 @@ def main(page: Path, seeds: int | None = None, faulty_seeds: int | None = None) 
 
 
 def counted(flights: Iterable[Judged]) -> Iterator[Judged]:
-    """The same flights; how many there were is said on the way."""
+    """Yield the same flights; their number is printed on the way."""
     for count, flight in enumerate(flights, 1):
         if count % TOLD_EVERY == 0:
             print(f"integrity: {count} flights", file=sys.stderr)

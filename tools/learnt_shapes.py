@@ -143,7 +143,7 @@ def searched(axis: Axis, told: AutopilotGains, start: Shape) -> Shape:
 
 
 def between(name: str, vehicle: VehicleParameters, told: AutopilotGains) -> Iterator[str]:
-    """What the shipped table keeps half way between its nodes."""
+    """Lines on the margins that the shipped table keeps half way between its nodes."""
     nodes, shapes = (
         (learnt_shapes.PITCH_NODES, learnt_shapes.PITCH_SHAPES) if name == "forward"
         else (learnt_shapes.ROLL_NODES, learnt_shapes.ROLL_SHAPES)

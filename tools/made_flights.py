@@ -55,7 +55,7 @@ def signs(flights: Sequence[Verdict]) -> str:
 
 
 def section(flights: Sequence[Verdict], seeds: range, spent_s: float) -> str:
-    """What goes into the page."""
+    """The section for the page."""
     return (
         f"Printed by `make made-flights` with flownav {__version__}: {len(flights)} flights, seeds {seeds[0]} to "
         f"{seeds[-1]} of each class, in {spent_s / 60.0:.0f} minutes.\n\n{markdown(rows_of(flights))}"
@@ -103,7 +103,7 @@ def judge_all(asked: argparse.Namespace, seeds: range) -> None:
 
 
 def options() -> argparse.ArgumentParser:
-    """What it understands."""
+    """The parser of the command line."""
     parser = argparse.ArgumentParser(prog="made_flights.py", description="Made indoor flights: judged, or written.")
     parser.add_argument("what", choices=("judge", "compare", "write"))
     parser.add_argument("folder", type=Path, nargs="?", help="of real logs (compare), or where flights go (write)")

@@ -1,8 +1,9 @@
-"""What the navigator takes on each processor, measured in emulators: python tools/onboard.py PAGE.
+"""The navigator's code size, memory and instructions on each processor, measured in emulators: python
+tools/onboard.py PAGE.
 
 Bytes of code, RAM, stack, instructions of each call by sensor, and digests, of the shipped flight pad_return and of the
 same with inertial readings at 250 and 400 Hz. `make onboard` writes them as tables into a page, and as
-`export/onboard/files/measured.json` into what `flownav build` says.
+`export/onboard/files/measured.json` for the output of `flownav build`.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ from integrity import placed
 
 BEGIN, END = "<!-- make onboard: begin -->", "<!-- make onboard: end -->"
 USUAL_HZ, IMU_HZ = 100.0, (100.0, 250.0, 400.0)
-SUMMED = ((250.0, 2), (400.0, 4))  # rates of the IMU, and how many readings are handed over as one
+SUMMED = ((250.0, 2), (400.0, 4))  # rates of the IMU, and how many readings are passed as one
 MEASURED = Path(package.__file__).parent / "files" / "measured.json"
 DIGEST_EVERY = 500
 HORIZON_S = Rates().horizon_s
@@ -180,7 +181,7 @@ def rates(others: dict[float, Run]) -> list[tuple[str, ...]]:
 
 
 def summed(flight: Flight, readings: Sequence[Given]) -> list[tuple[str, ...]]:
-    """What means of inertial readings cost, by rate and how many are in one."""
+    """The cost of means of inertial readings, by rate and number of readings in one."""
     settings, lag = packed_settings(flight, pace_of(flight.settings, HORIZON_S))
     rows = []
     for hz, count in SUMMED:
@@ -200,7 +201,7 @@ def parts() -> list[tuple[str, ...]]:
 
 
 def narrowed(flight: Flight, readings: Sequence[Given]) -> list[tuple[str, ...]]:
-    """What 32 bits lose."""
+    """The loss by 32 bits."""
     rates = rates_of(flight.segment, HORIZON_S)
     settings, lag = packed_settings(flight, pace_of(flight.settings, rates.horizon_s))
     names = list(KEPT)
@@ -211,7 +212,7 @@ def narrowed(flight: Flight, readings: Sequence[Given]) -> list[tuple[str, ...]]
 
 
 def told(runs: dict[str, Run]) -> dict[str, Any]:
-    """What `flownav build` says of a target."""
+    """The facts that `flownav build` reports of a target."""
     return {
         target: {
             "flight": SHIPPED_FLIGHT,

@@ -21,7 +21,7 @@ HERE = Path(__file__).parents[1] / "src"
 
 
 def works() -> dict[str, Callable[[], object]]:
-    """What is timed, by name; kernels are compiled by a first call."""
+    """The works that are timed, by name; kernels are compiled by a first call."""
     from flownav.core.compile import LANES
     from flownav.simulation.assemble import assemble
     from flownav.simulation.engine import buffers_of, fly_into, fly_one

@@ -1,6 +1,7 @@
 """Rare events of the paper's landing, by subset simulation beside flights at random. `make rare`.
 
-python tools/rare_table.py [FLIGHTS] flies so many at random first (100000 if not given; 0: none, for the time alone).
+python tools/rare_table.py [FLIGHTS] flies this number at random first (100000 if not given; 0: none, for the time
+alone).
 """
 
 from __future__ import annotations

@@ -118,7 +118,7 @@ def loops_of(shape: Shape, axis: Axis) -> Complex:
 
 
 def drift_m(shape: Shape, axis: Axis) -> float:
-    """Standard deviation of the position in turbulence and under a false tilt [m], the vehicle as told."""
+    """Standard deviation of the position in turbulence and under a false tilt [m], the vehicle as stated."""
     w, gains = OMEGA_RAD_S, feedback(shape, axis)
     cyclic, gust = axis.by_cyclic[0], axis.by_gust[0]
     answered = sum(gain * gust[i] for i, gain in enumerate(gains))
@@ -161,7 +161,7 @@ def shape_in(gains: AutopilotGains, name: str) -> Shape:
 
 
 def shaped(name: str, start: AutopilotGains, path: Path | None = None, *, rounds: int = 60) -> tuple[Shape, float]:
-    """The best gains of an axis found in so many rounds, and their drift [m]. start: the other axes' gains."""
+    """The best gains of an axis found in `rounds` rounds, and their drift [m]. start: the other axes' gains."""
     axis = axis_of(name, path)
     best = [np.inf]
 

@@ -1,4 +1,5 @@
-"""What the house weighs: `make weigh`. Rooms on floors, modules, lines, functions too long or wide, index arithmetic.
+"""Size and structure of the code: `make weigh`. Rooms on floors, modules, lines, functions too long or wide, index
+arithmetic.
 
 python tools/weigh.py [--list ARGUMENTS|LINES|NESTING]
 """

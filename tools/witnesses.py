@@ -2,7 +2,7 @@
 
 One flight of the scenario `sortie` a seed, flown on its own navigator; its recorded readings then go through the same
 navigator again with one lie of LASTS_S in them. The flight is not changed by the lie, so that what moves is the
-estimate alone (a vehicle that flies on it is in `flownav faults`). The same readings give the same bits in flight, from
+estimate alone (an autopilot that uses it is in `flownav faults`). The same readings give the same bits in flight, from
 a log and on a link (tests/navigation, tests/live), so that one way in stands for all.
 
 Printed into a page by `make witnesses`: python tools/witnesses.py PAGE [--seeds N]
@@ -79,7 +79,7 @@ Said = Callable[[Array, Strike], Array]
 
 
 def told(what: Said) -> Injector:
-    """What is said in place of all values (n, k) of a stream; `lied` takes those of the lie's time and columns."""
+    """The injector that replaces all values (n, k) of a stream; `lied` takes those of the lie's time and columns."""
     return lambda stream, strike: replace(stream, value=np.asarray(what(stream.value, strike)))
 
 
@@ -101,13 +101,13 @@ def through(gain: float, witness: Witness) -> Injector:
 
 
 def in_fives(value: Array, strike: Strike) -> Array:
-    """The first of every five, told five times."""
+    """The first of every five, repeated five times."""
     since = np.arange(len(value)) - np.argmax(strike.inside)
     return np.asarray(value[np.maximum(np.arange(len(value)) - since % IN_FIVES, 0)])
 
 
 def noisy(value: Array, strike: Strike) -> Array:
-    """Noise of so many times its own, which its second differences show."""
+    """Noise NOISIER times its own, which its second differences show."""
     usual = np.sqrt(np.mean(np.diff(value, 2, axis=0) ** 2, axis=0) / 6.0)
     return np.asarray(value + NOISIER * usual * strike.rng.standard_normal(value.shape))
 
@@ -157,7 +157,7 @@ def phases(truth: Table) -> dict[str, float]:
 
 
 class Cost(NamedTuple):
-    """What a lie cost. moved_m: the estimate, at most, until AFTER_S after its end; back_s: None where never right.
+    """The cost of a lie. moved_m: the estimate, at most, until AFTER_S after its end; back_s: None where never right.
 
     beyond_s: how long the error was beyond the protection level without a warning, which it was not without the lie.
     """
@@ -204,7 +204,7 @@ def beyond(run: Navigated, truth: Table) -> float:
 
 # -- as a page ---------------------------------------------------------------------------------------------------
 HEADINGS = ("witness", "lie", "moved, median [m]", "at most [m]", "in", "right again in 5 s [%]", "slowest [s]",
-            "beyond the level unsaid [s], at most")  # fmt: skip
+            "beyond the level without a warning [s], at most")  # fmt: skip
 
 
 def table(found: Sequence[Cost]) -> str:

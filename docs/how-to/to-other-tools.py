@@ -14,8 +14,8 @@ for name in ("foxglove", "tum", "csv"):
     print(name, [path.name for path in record.export(name, f"out/flight.{name}")])
 
 # %% [markdown]
-# Google Earth needs to know where on earth the local frame lies. A log with GPS says so itself; a simulated flight
-# is told.
+# Google Earth needs to know where on earth the local frame lies. A log with GPS has that place; for a simulated
+# flight it is given.
 
 # %% language="bash"
 # flownav export samples/pad_return.fnr --to kml --origin 47.3977,8.5456,488 --out out/flight.kml

@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Certify a landing
 #
-# One good landing shows little. A test plan asks for more: *the vehicle touches down within so many metres of the
-# pad, with a probability of so much, at a confidence of so much, in the wind that we expect*. `flownav certify`
+# One good landing shows little. A test plan asks for more: *the vehicle touches down within a given distance of the
+# pad, with a given probability and confidence, in the wind that we expect*. `flownav certify`
 # takes that statement as a file, says how many flights it needs, flies them, and answers **pass**, **fail** or
 # **not shown**.
 #

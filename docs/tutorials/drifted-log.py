@@ -87,7 +87,7 @@ print(flownav.explain("samples/flight-csv", autopilot="ardupilot").cure_text())
 # %% [markdown]
 # ## What was not looked into
 #
-# A hypothesis that the log cannot show is said, not guessed.
+# A hypothesis that the log cannot show is reported, not guessed.
 
 # %%
 for cause, what in explained.missing:

@@ -46,9 +46,9 @@ print(f"touched {contact['distance_m']:.2f} m from the pad's centre, sinking at 
 # %% [markdown]
 # ## Look at the estimate
 #
-# `record.flown` is a table: a dictionary of NumPy arrays, whose names end in their units. It is what the autopilot
-# flew on: the navigator's estimate of each instant, counted from the pad. `pos_d_m` is the position downwards, so
-# that the height is its negative.
+# `record.flown` is a table: a dictionary of NumPy arrays, whose names end in their units. It is the estimate used by
+# the autopilot: the navigator's estimate of each instant, relative to the pad. `pos_d_m` is the position downwards,
+# so that the height is its negative.
 
 # %%
 flown = record.flown.to_pandas()

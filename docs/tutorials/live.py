@@ -51,7 +51,7 @@ plt.show()
 # ## The same estimate again
 #
 # What was recorded live can be replayed, and gives the same estimate to the last bit. That is how you find out
-# later why the navigator said what it said.
+# later why the navigator's estimate was what it was.
 
 # %%
 import numpy as np

@@ -1,4 +1,4 @@
-"""What is no argument of a call is one line that names it and says what is needed, and never Python's own complaint."""
+"""An unknown argument of a call is one line that names it and the valid ones, and never Python's own complaint."""
 
 from __future__ import annotations
 

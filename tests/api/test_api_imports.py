@@ -1,4 +1,4 @@
-"""What `import flownav` costs: nothing that computes is loaded before it is asked for."""
+"""The cost of `import flownav`: nothing that computes is loaded before it is needed."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ def _members(name: str) -> dict[str, object]:
 
 
 def _function(value: object) -> object:
-    """What a class's entry runs; None of a constant."""
+    """The function behind a class's entry; None of a constant."""
     if isinstance(value, property):
         return value.fget
     if isinstance(value, classmethod | staticmethod):
@@ -85,7 +85,7 @@ def test_every_argument_of_a_function_is_explained_by_its_name(place):
 
 @pytest.fixture(scope="module")
 def around(tmp_path_factory):
-    """What the examples are run with: a folder to write to, a flight's log and a rig's log."""
+    """The names that the examples use: a folder to write to, a flight's log and a rig's log."""
     folder = tmp_path_factory.mktemp("examples")
     log = log_of_flight(40.0).write(folder / "garden")
     return {"flownav": flownav, "folder": folder, "log": log, "rig_log": swing(folder / "swing.csv")}

@@ -45,7 +45,7 @@ def replayed(tmp_path_factory):
 
 
 def own(record):
-    """What of a flight is scored."""
+    """The scored table of a flight."""
     return record.flown if "flown" in record else record.estimate
 
 

@@ -1,4 +1,4 @@
-"""What a flight's time is spent on: the parts are parts of the whole, and each is the work that it says."""
+"""The parts of a flight's time: they add up to the whole, and each is the work that it names."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_the_parts_are_parts_of_the_whole(quad):
 
 
 def test_what_is_saved_when_nobody_takes_the_readings_is_the_navigators(quad, monkeypatch):
-    """Each part is worked, in times that are given: the whole, the plant alone, flown on the truth, and untaken."""
+    """Each part is worked, in times that are given: the whole, the plant alone on the truth, and readings untaken."""
     given = iter((10.0, 3.0, 7.0, 2.5))
     monkeypatch.setattr(timed, "processor_s", lambda work: (work(), next(given))[1])
     parts = parts_of(quad)

@@ -135,9 +135,9 @@ def test_the_papers_filter_notes_its_pad_at_the_start_or_last_before_take_off_an
 @pytest.mark.parametrize(
     ("name", "known"),
     [
-        ("takeoff", "where it stands until take-off at 10 s"),
-        ("landing", "where it hovers for its first 5 s, flown on the truth"),
-        ("approach", "nothing, but it is flown on the truth for its first 5 s"),
+        ("takeoff", "its position on the ground until take-off at 10 s"),
+        ("landing", "its position in hover for the first 5 s (true state used)"),
+        ("approach", "nothing (true state used for the first 5 s)"),
     ],
 )
 def test_what_a_vehicle_knows_exactly_is_said(name, known):
@@ -199,7 +199,7 @@ def test_the_command_says_every_target_and_writes_what_it_prints(tmp_path):
         (heading,) = (line for line in done.stdout.splitlines() if f"{truth_model}: RMSE of the autopilot's" in line)
         assert " in flight [m, m/s, °] | x " in heading
         assert [cell.strip() for cell in heading.split("|")][8:11] == ["roll", "pitch", "yaw"]
-    assert "| takeoff  | where it stands until take-off at 10 s " in done.stdout
+    assert "| takeoff  | its position on the ground until take-off at 10 s " in done.stdout
     assert "| pad fix " in done.stdout
     for line in done.stdout.splitlines():
         assert line == "" or (line.startswith("| ") and line.endswith(" |"))
@@ -220,7 +220,7 @@ def test_json_has_every_figure_and_the_exit_status_follows_the_targets():
         assert 0.0 < facts["touchdown"]["success"]["rate"] <= 1.0
     assert {target["truth_model"] for target in case["targets"]} == {"matched", "ensemble"}
     assert case["matched"]["p95_largest_axis_m"] != case["ensemble"]["p95_largest_axis_m"]
-    assert case["known_exactly"] == "where it hovers for its first 5 s, flown on the truth"
+    assert case["known_exactly"] == "its position in hover for the first 5 s (true state used)"
     missed = [target for target in case["targets"] if not target["kept"]]
     assert bool(missed) == isinstance(done.exception, VerdictError)
     for target in missed:

@@ -1,4 +1,6 @@
-"""What a campaign's folder holds is what was flown: bits that flipped, rows that were edited, files that were added."""
+"""A campaign's folder holds its flights unaltered: bits that flipped, rows that were edited, files that were added
+are found.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,7 @@ def off(cell, seed, first, flights):
 
 
 def flown(folder, plan):
-    """The campaign flown into a folder; its data, the engine, and what was told of damage."""
+    """The campaign flown into a folder; its data, the engine, and the reported damage."""
     engine, told = StandIn(off), []
     with Store(folder).opened(plan) as store:
         data = run_campaign(plan, engine, store, lambda progress: told.append(progress.damaged))
@@ -188,7 +190,7 @@ def test_columns_that_change_their_names_rows_that_change_places_or_go_are_notic
 
 
 def test_an_edit_with_digests_that_fit_breaks_the_chain_of_what_follows(folder):
-    """Only who makes all later digests anew, too, is not told by them; flights flown again tell of him."""
+    """Only an author who makes all later digests anew, too, is not found by them; flights flown again reveal him."""
     first, second = Dataset(folder).parts(0)
     rewritten(first, with_score(0.0), chained=True)
     _, engine, told = flown(folder, plan_of())

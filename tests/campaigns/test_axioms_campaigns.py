@@ -1,4 +1,4 @@
-"""What order, company and mirrors demand of what many flights show."""
+"""Invariances of figures of many flights: order, company and mirrors."""
 
 from __future__ import annotations
 

@@ -43,7 +43,9 @@ def gps_variance(setup):
 
 
 def start_bias_variance(setup):
-    """Of the accelerometer at the start, as the navigator has it: what is told, and how its readings shook."""
+    """Variance of the accelerometer's bias at the start, as the navigator has it: the stated one, and that of shaken
+    readings.
+    """
     spread = fly_recorded(setup, 1).tables["states"]["std_accel_bias_z_m_s2"][0]
     assert spread > setup.fitted.told.settings.accel_bias_sigma_m_s2
     return spread**2

@@ -1,4 +1,4 @@
-"""What a campaign of few flights says: no figure that its largest flight alone would be, and how many it needs."""
+"""A campaign of few flights prints no figure that its largest flight alone would be, and the number it needs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What gives memory back: pieces that are free go back to the system."""
+"""Pieces of memory that are free go back to the system."""
 
 from __future__ import annotations
 

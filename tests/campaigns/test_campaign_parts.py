@@ -1,4 +1,4 @@
-"""What a campaign is made of: measures and events, designs, figures, stops, sweeps, and blocks taken in order."""
+"""The parts of a campaign: measures and events, designs, figures, stops, sweeps, and blocks taken in order."""
 
 from __future__ import annotations
 

@@ -160,7 +160,7 @@ class Killed(Exception):
 
 
 def killed_after(flights):
-    """A watch at which a campaign ends, as if it was killed, once so many flights have flown."""
+    """A watch that ends a campaign, as if it was killed, once this number of flights has flown."""
 
     def watch(progress):
         if progress.flown >= flights:
@@ -269,7 +269,7 @@ def test_killed_while_it_writes_it_goes_on_with_the_same_bytes(tmp_path):
 
 
 def killed_and_gone_on(folder, flights, kills, seed):
-    """Run a campaign, kill it so many times after it has written something, and let it end."""
+    """Run a campaign, kill it this number of times after it has written something, and let it end."""
     rng = random.Random(seed)
     for _ in range(kills):
         had = len(Dataset(folder).parts(0))
@@ -298,7 +298,8 @@ def test_killed_twenty_times_it_ends_with_the_same_bytes(tmp_path):
 
 
 def two_killed_and_gone_on(folder, command, kills, seed):
-    """Two runs at once in one folder, both killed at any time, so many times; what those that ended by themselves said.
+    """Two runs at once in one folder, both killed at any time, `kills` times; the output of those that ended by
+    themselves.
 
     One flies and the other says so; where the first is killed, the second may have its place in the next turn.
     """

@@ -20,7 +20,7 @@ from flownav.campaigns.tolerance import (
 
 
 def chance_to_pass(flights: int, failure_rate: float, probability: float, confidence: float) -> float:
-    """How likely so many flights pass when each fails at this rate."""
+    """Probability that this number of flights passes when each fails at this rate."""
     most = allowed(flights, probability, confidence)
     return float(binom.cdf(most, flights, failure_rate)) if most >= 0 else 0.0
 

@@ -1,4 +1,4 @@
-"""What numba-cuda makes of a flight: code for an H200 without one, and the same code run on the CPU."""
+"""A flight compiled by numba-cuda: code for an H200 without one, and the same code run on the CPU."""
 
 from __future__ import annotations
 

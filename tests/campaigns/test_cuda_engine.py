@@ -1,4 +1,4 @@
-"""What the CUDA engine does whatever runs its threads: parts in order, flights that fit, truths drawn beside it."""
+"""The CUDA engine, whatever runs its threads: parts in order, flights that fit, truths drawn meanwhile."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ def complaint(folder, done):
 
 @pytest.fixture(params=["in a process of its own", "as JSON"])
 def line(request, tmp_path, monkeypatch):
-    """For people as a driver without a device answers; as JSON where there is said to be none."""
+    """For people as a driver without a device answers; as JSON where none is reported."""
     folder = tmp_path / "campaign"
     if request.param != "as JSON":
         command = [sys.executable, "-m", *ASKED, "--out", folder]

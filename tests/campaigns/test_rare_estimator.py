@@ -23,7 +23,7 @@ def smaller(monkeypatch):
 
 @pytest.fixture(scope="module")
 def repeats():
-    """What many estimates of 1e-4 found, each of its own seed."""
+    """Many estimates of 1e-4, each of its own seed."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(estimate, "PILOT_FLIGHTS", 128)
         patch.setattr(estimate, "ISLAND_FLIGHTS", 128)

@@ -198,4 +198,4 @@ def test_what_is_assumed_is_said_of_every_vehicle(tmp_path):
     assert masses[0] > 2.0 * masses[1]
     assert any("tail rotor" in words for words in said["not_modelled"])
     assert any("propellers" in words for words in said["not_modelled"])
-    assert said["known_exactly"] == "where it hovers for its first 5 s, flown on the truth"
+    assert said["known_exactly"] == "its position in hover for the first 5 s (true state used)"

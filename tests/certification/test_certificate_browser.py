@@ -41,7 +41,7 @@ def test_every_figure_is_drawn_and_the_verdict_is_said(browser, page):
     text = visit.page.inner_text("body")
     assert visit.page.inner_text(".verdict b") == "Fail"
     for words in ("Distance of the first contact from the pad's centre at most 0.5 m with 90 %", "Consumer's risk",
-                  "Tolerance bound", "from 2 m", "What was assumed", "SHA-256", "Approved by"):  # fmt: skip
+                  "Tolerance bound", "from 2 m", "Assumptions", "SHA-256", "Approved by"):  # fmt: skip
         assert words in text
     visit.context.close()
 

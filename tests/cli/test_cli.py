@@ -34,7 +34,7 @@ def one_line_error(done):
 
 
 def short(tmp_path, text="", name="landing", duration="2.0"):
-    """A short copy of a shipped scenario, handed over after half a second, with lines added to its end."""
+    """A short copy of a shipped scenario, with its hand-over after half a second, with lines added to its end."""
     path = tmp_path / "short.toml"
     original = shipped(f"{name}.toml").read_text(encoding="utf-8")
     soon = "\n[filter]\nhandover_s = 0.5\n"
@@ -65,7 +65,7 @@ def test_fly_json_has_every_key_and_its_record_is_there(tmp_path):
     assert all(set(entry) == NUMBER_KEYS for entry in facts["states"].values())
     assert facts["touchdown"] is None
     assert [facts[key] for key in ("rmse_over_bound", "anees_inside_fraction")] == [None, None]
-    assert facts["known_exactly"] == "where it hovers for its first 0.5 s, flown on the truth"
+    assert facts["known_exactly"] == "its position in hover for the first 0.5 s (true state used)"
     record = Record.load(tmp_path / "f.fnr")
     handed = record.tables["truth"]["t_s"] >= 0.5
     error = (record.matrix("flown", ("pos_n_m",)) - record.matrix("truth", ("pos_n_m",)))[handed]
@@ -116,7 +116,7 @@ def test_a_flight_that_ends_before_the_hand_over_has_null_errors_and_a_table(tmp
     assert set(facts["states"]["w"].values()) == {None}
     shown = run("fly", path, "--force", cwd=tmp_path)
     assert shown.returncode == 0, shown.stderr
-    assert "given to the vehicle exactly  where it hovers for its first 9 s" in shown.stdout
+    assert "known without error  its position in hover for the first 9 s" in shown.stdout
     assert (tmp_path / "out" / "landing.html").exists()
 
 

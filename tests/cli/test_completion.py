@@ -15,13 +15,13 @@ from flownav.cli import main
 
 
 def asked(line: str) -> dict[str, str]:
-    """What bash says in the environment when it asks for the end of a line."""
+    """The environment that bash sets when it completes the end of a line."""
     return {"_FLOWNAV_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(line.count(" "))}
 
 
 @pytest.fixture
 def completed(tmp_path, monkeypatch, capsys):
-    """What bash would be offered at the end of a line."""
+    """The completions that bash gets for the end of a line."""
 
     def offered(line: str) -> list[str]:
         monkeypatch.chdir(tmp_path)

@@ -55,7 +55,7 @@ def contents(folder: Path) -> dict[str, bytes | str]:
 
 
 def complaint(capsys, monkeypatch, command: str) -> str:
-    """What a command says on standard error when it is refused: one line, status 2, at once, and nothing changed."""
+    """The message on standard error of a command that is refused: one line, status 2, at once, and nothing changed."""
     before, begun = contents(Path.cwd()), time.process_time()
     monkeypatch.setattr(sys, "argv", ["flownav", *command.split()])
     with pytest.raises(SystemExit) as left:

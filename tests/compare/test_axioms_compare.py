@@ -1,4 +1,4 @@
-"""What north, time, mirrors and scale demand of the least that a flow sensor can do."""
+"""Invariances of dead reckoning by a flow sensor: north, time, mirrors and scale."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ def started(place: Path, *command: str, **environment: str) -> subprocess.Popen[
 
 
 def ran(mother: Nursery, place: Path, **environment: str) -> tuple[str, list[str]]:
-    """What the program prints, and what it says of compilation without the time."""
+    """The program's output, and its lines about compilation without the time."""
     done = mother.run(place / "program.py", environment_of(place, environment))
     assert done.returncode == 0, done.stderr
     return done.stdout.strip(), [line.partition(" (test) in")[0] for line in done.stderr.splitlines()]

@@ -63,7 +63,7 @@ class Place:
         (self.folder / "helper_law.py").write_text(text)
 
     def run(self, **environment: str) -> tuple[str, list[str]]:
-        """What the program prints, and its lines on standard error, without the news of compilation's time."""
+        """The program's output, and its lines on standard error without the time of compilation."""
         paths = os.pathsep.join([str(closure.PACKAGE.parent), str(self.folder)])
         env = {**os.environ, "FLOWNAV_CACHE": str(self.cache), "PYTHONPATH": paths, **environment}
         program = self.folder / "program.py"

@@ -123,7 +123,7 @@ def test_a_kernel_allocates_and_returns():
 
 
 def test_an_error_in_a_unit_is_told_and_kept_from_its_caller(monkeypatch):
-    """C has no exceptions: Python is told through its hook for what cannot be raised."""
+    """C has no exceptions: Python reports them through its hook for exceptions that cannot be raised."""
 
     def fail(p):
         if p[0] < 0.0:
@@ -160,7 +160,9 @@ def test_lanes_are_vectorised():
 
 @pytest.fixture(scope="module")
 def rotations(tmp_path_factory):
-    """What the program prints with such an environment; each process compiles, or loads what one like it has kept."""
+    """The program's output with such an environment; each process compiles, or loads the kernels that one like it
+    has kept.
+    """
     place = tmp_path_factory.mktemp("rotations")
     program = place / "program.py"
     program.write_text(ROTATIONS)
@@ -197,7 +199,7 @@ class Told(NamedTuple):
 
 @procedure
 def never_taken(told):
-    """What no compiler can make anything of, were it to look at it."""
+    """A branch that no compiler can type, were it to look at it."""
     return told.nothing_of_this_name
 
 

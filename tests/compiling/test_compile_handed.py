@@ -1,4 +1,4 @@
-"""Records of the package are handed over whole, whoever compiles the caller; others as Numba does it."""
+"""Records of the package are passed whole, whoever compiles the caller; others as Numba does it."""
 
 from __future__ import annotations
 

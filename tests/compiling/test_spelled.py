@@ -1,4 +1,4 @@
-"""Access to records in kernels, spelled out as instructions: what plain Python does with them, and what is refused."""
+"""Access to records in kernels, written as instructions: the results of plain Python, and the refused uses."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def test_what_is_no_flat_array_or_may_not_be_written_is_no_lane_buffer():
 
 @pytest.mark.parametrize("lanes", [ONE_LANE, LANES])
 def test_fields_that_a_record_leaves_out_are_stored_by_their_defaults(lanes):
-    """As Python makes them; Numba's tuple has only what it was told, and that did not compile."""
+    """As Python makes them; Numba's tuple has only the given fields, and that did not compile."""
     compiled, plain = np.zeros(12 * len(lanes)), np.zeros(12 * len(lanes))
     said_in_part(compiled, lanes)
     said_in_part.py_func(plain, lanes)

@@ -1,4 +1,4 @@
-"""What symmetry and time demand of the autopilot: a turn of north, a mirror, a path that begins at another time."""
+"""Invariances of the autopilot: a turn of north, a mirror, a path that begins at another time."""
 
 from __future__ import annotations
 

@@ -63,12 +63,14 @@ def test_the_stir_is_small_without_a_mean_and_each_axis_has_lines_of_its_own():
 
 # -- the model ----------------------------------------------------------------------------------------------------
 def truth_of(rng):
-    """A vehicle about what is told, as wide as the prior: k of pitch and roll, f, the servo's frequency and damping."""
+    """A vehicle drawn about the stated values with the prior's width: k of pitch and roll, f, the servo's frequency
+    and damping.
+    """
     return np.exp(np.array([0.25, 0.25, 0.15, 0.15, 0.05]) * rng.standard_normal(5))
 
 
 def told_times(shares):
-    """What is told, times these shares."""
+    """The stated parameters times these shares."""
     pitch, roll, flap, servo, damping = shares
     return TOLD._replace(
         pitch_stiffness_1_s2=TOLD.pitch_stiffness_1_s2 * pitch,

@@ -177,7 +177,7 @@ def test_the_plant_is_the_reduced_model_where_attitude_is_held():
 # -- the search that shaped the gains -----------------------------------------------------------------------------
 @pytest.mark.parametrize("name", ["forward", "right"])
 def test_the_search_sees_the_loops_that_are_flown(name):
-    """Its own cuts of one axis are those of the whole autopilot on the vehicle as told, but for what couples axes."""
+    """Its own cuts of one axis are those of the whole autopilot on the vehicle as stated, but for what couples axes."""
     axis = shape_gains.axis_of(name)
     ours = shape_gains.loops_of(shape_gains.shape_in(GAINS, name), axis)[0]
     whole = loop_gains(frequency_response(PLANT, shape_gains.OMEGA_RAD_S), shape_gains.OMEGA_RAD_S, GAINS)

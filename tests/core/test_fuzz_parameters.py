@@ -47,7 +47,7 @@ baro_sigma_m = 0.3
 
 
 def sensor_as_told(path: Path) -> tuple[Any, ...]:
-    """A sensor's file, and what the navigator is told of it."""
+    """A sensor's file, and the navigator's settings from it."""
     sensor = load_sensor(path)
     return sensor, settings_of(sensor).settings
 
@@ -118,7 +118,7 @@ def test_the_samples_themselves_are_loaded(tmp_path, name):
     ("px4flow_paper.toml", "c_1_s2", "c_1_s2 = 1e-320 #", "greater than or equal to 0.001, got 1e-320"),
 ])  # fmt: skip
 def test_what_damaged_files_found(tmp_path, name, said, instead, words):
-    """Seeds 400368 and 403252: a number of 4800 digits could not be told, and a delay of b/c was infinite."""
+    """Seeds 400368 and 403252: a number of 4800 digits could not be printed, and a delay of b/c was infinite."""
     text = content_of(name).decode()
     assert said in text
     (tmp_path / "x.toml").write_text(text.replace(said, instead, 1))

@@ -1,4 +1,4 @@
-"""What north, scale and time demand of the filter's laws, whatever they are used for: plain functions."""
+"""Invariances of the filter's laws as plain functions: north, scale and time."""
 
 from __future__ import annotations
 

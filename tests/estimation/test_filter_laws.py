@@ -222,7 +222,7 @@ def test_the_sights_triad_is_orthonormal_and_right_handed(forward, right):
 
 # -- signs and conventions, by hand ----------------------------------------------------------------------------
 def predicted(filter_: Filter, law: Observation, axis: int = 0, **scalars: float) -> float:
-    """What a law expects to read: the negative of its innovation where zero is read."""
+    """The reading that a law predicts: the negative of its innovation where zero is read."""
     run = filter_.copy()
     run.reading[0] = 0.0
     law(run.work, ONE_LANE, axis, **scalars)
@@ -394,7 +394,7 @@ def test_a_gyro_at_rest_reads_its_bias():
 @EXAMPLES
 @given(st.integers(0, 2**32 - 1))
 def test_readings_one_after_the_other_are_the_joint_update(seed):
-    """What the first component corrected is not corrected again by the second."""
+    """The second component does not correct again the part that the first has corrected."""
     after = filter_at(seed, 0.2, -0.3, 1.0, 6.0)
     after.p = random_covariance(np.random.default_rng(seed), 0.01)
     random = np.random.default_rng(seed)

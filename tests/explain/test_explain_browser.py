@@ -1,4 +1,4 @@
-"""What a log's page and the explanation's own page show of it, in a real browser."""
+"""A log's page and the explanation's own page in a real browser."""
 
 from __future__ import annotations
 

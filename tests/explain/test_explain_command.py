@@ -40,7 +40,7 @@ def test_the_command_names_the_cause_and_writes_page_and_parameters(turned, tmp_
     assert "SENS_FLOW_ROT\t2" in (tmp_path / facts["parameters"]).read_text()
     page = (tmp_path / facts["page"]).read_text()
     assert facts["causes"][0]["title"].replace("'", "&#39;") in page
-    assert "What was looked for" in page
+    assert "Causes that were checked" in page
 
 
 def test_a_sound_log_ends_well_and_lists_what_was_looked_for(clean, tmp_path):

@@ -1,4 +1,4 @@
-"""The table of how often an explanation is right: what counts as right, and that wrong is said."""
+"""The table of how often an explanation is right: the definition of right, and that wrong ones are printed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an autopilot was told: parameters of both dialects, new and old, as the same facts."""
+"""The settings of an autopilot: parameters of both dialects, new and old, as the same facts."""
 
 from __future__ import annotations
 

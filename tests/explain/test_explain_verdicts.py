@@ -1,4 +1,4 @@
-"""Planted faults are named, sound flights are not, and what a log lacks is said."""
+"""Planted faults are named, sound flights are not, and missing data are reported."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PLANTED = (
     ("own", "power cable beside the compass"),
     ("own", "motors unbalanced"),
     ("own", "inertial unit restarts"),
-    ("own", "said to have landed while it hovers low"),
+    ("own", "reported as landed while it hovers low"),
     ("own", "flow never switched on"),
     ("forum", "range is height reference, no GPS"),
     ("forum", "switched to flow too high up"),

@@ -1,4 +1,6 @@
-"""TUM and EuRoC: frames by their axioms, files by the rules that evo reads them with, nothing lost unsaid."""
+"""TUM and EuRoC: frames by their axioms, files by the rules that evo reads them with, nothing lost without a
+warning.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the library takes: bytes of code and RAM, stack, and instructions of every call on an emulated Cortex-M7."""
+"""The library's size: bytes of code and RAM, stack, and instructions of every call on an emulated Cortex-M7."""
 
 from __future__ import annotations
 

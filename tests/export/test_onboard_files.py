@@ -1,4 +1,4 @@
-"""What is written for other tools: objects, archives, shared objects, modules, the header and constants of C."""
+"""Files written for other tools: objects, archives, shared objects, modules, the header and constants of C."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One recorded link: what a live session is told of the state of now, and sends, is what the library says of it."""
+"""One recorded link: a live session that is given the library's state of now sends the same bytes."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Watched(Rings):
     """Rings that note what is done with them."""
 
     steps: list[Step]
-    said: Iterator[NowRow[Array]] | None = None  # told in place of what these rings know
+    said: Iterator[NowRow[Array]] | None = None  # given in place of the values of these rings
 
     def __init__(self, sizes: Sizes, most: int) -> None:
         super().__init__(sizes, most)
@@ -75,7 +75,7 @@ class Watched(Rings):
 def flown(
     monkeypatch: pytest.MonkeyPatch, frames: list[Arrival], said: Iterator[NowRow[Array]] | None = None
 ) -> tuple[list[Step], list[Sent]]:
-    """What a session did with its rings, and what it sent."""
+    """The steps of a session with its rings, and the messages it sent."""
     kind: Any = type("Noted", (Watched,), {"steps": [], "said": said})
     monkeypatch.setattr(filtering, "Rings", kind)
     monkeypatch.setattr(filtering, "ROOM", ROOM)
@@ -96,7 +96,7 @@ def begun(begin: Begun, target: str | None, folder: Path) -> Board | LibraryBoar
 
 
 def feed(board: Board | LibraryBoard, until_s: float, newest_s: float) -> None:
-    """What is of instants up to until_s is fed: the horizon is where a session has it."""
+    """Feed the readings of instants up to until_s: the horizon is where a session has it."""
     for horizon_s, work in ((newest_s - until_s, True), (np.inf, False)):
         if isinstance(board, Board):
             board.settings[progress.PACE] = horizon_s
@@ -107,7 +107,7 @@ def feed(board: Board | LibraryBoard, until_s: float, newest_s: float) -> None:
 
 
 def told_by(target: str | None, steps: list[Step], folder: Path) -> list[NowRow[Array]]:
-    """What the library says where the session was told something."""
+    """The library's states of now where the session was given one."""
     board, newest_s, found = None, -np.inf, []
     for step in steps:
         if isinstance(step, Begun):

@@ -40,7 +40,7 @@ class Page(Visit):
         return self.after(lambda: self.page.set_input_files("#file", path))
 
     def after(self, what: Callable[[], object]) -> str:
-        """What it says after something was done that lets it fuse."""
+        """The page's state after an action that lets it fuse."""
         self.page.evaluate("document.documentElement.dataset.state = 'busy'")
         what()
         self.until(ENDED)
@@ -78,7 +78,7 @@ def page(browser, html) -> Iterator[Page]:
 
 
 def replayed(record: Path, folder: Path, *more: object) -> dict[str, Any]:
-    """What `flownav replay` says of the same, as far as the page says it."""
+    """The figures of `flownav replay` on the same record, as far as the page has them."""
     done = run("replay", record, *more, "--json", "--out", folder / "replayed.fnr", "--force")
     assert done.returncode == 0, done.stderr
     facts: dict[str, Any] = json.loads(done.stdout)

@@ -1,4 +1,4 @@
-"""The live path behind the library's interface: what waits, is fed, and told, beside what Python makes of the same."""
+"""The live path behind the library's interface: waiting, feeding and the state of now, compared with Python's."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def test_the_way_through_a_gap_is_shared_among_calls():
     assert on.now(newest + 8.5).status == progress.TOLD
 
 
-# -- what is told ---------------------------------------------------------------------------------------------
+# -- the state of now -------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("ahead_s", [0.0, 0.1, 0.263, 0.4])
 def test_the_state_of_now_is_what_python_carries_on(ahead_s):
     readings = [given for given in arriving(FLOWN) if given.t_s < 9.0]

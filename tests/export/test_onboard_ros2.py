@@ -109,7 +109,7 @@ def as_heard(given: Given) -> Given:
     return Given(sec - first_s + 1e-9 * nanosec, given.sensor, numbers)
 
 
-# -- what comes of it -----------------------------------------------------------------------------------------------
+# -- the result ------------------------------------------------------------------------------------------------------
 @pytest.fixture(scope="module")
 def said(program) -> list[list[str]]:
     text = "\n".join(line_of(given) for given in READINGS)

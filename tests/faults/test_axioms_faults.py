@@ -1,4 +1,4 @@
-"""What time and company demand of faults: a flight that began later fails alike, and what is not struck stays."""
+"""Invariances of faults: a flight that began later fails alike, and sensors that are not struck stay as they are."""
 
 from __future__ import annotations
 

@@ -143,7 +143,7 @@ def test_flow_of_the_wrong_sign_is_told_or_the_vehicle_is_down_before_it_is_far(
 
 def test_without_any_sensor_for_five_seconds_nothing_lands(rows):
     row = rows["silence", 5.0]
-    assert row["said"]["flights"] >= 12  # else it strikes the ground before it is said
+    assert row["said"]["flights"] >= 12  # else it strikes the ground before the warning
     assert row["landed"] < 4
 
 

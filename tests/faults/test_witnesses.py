@@ -1,4 +1,4 @@
-"""Each witness lies in turn: what a lie makes of a stream, and where in a flight it is told."""
+"""Each witness lies in turn: the effect of a lie on a stream, and its place in a flight."""
 
 from __future__ import annotations
 

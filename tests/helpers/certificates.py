@@ -28,7 +28,7 @@ def run(*arguments):
 
 
 def found(folder, **more):
-    """What was found, by what was looked at; of two that are called alike the first that does not hold."""
+    """The findings by the part that was checked; of two with the same name the first that does not hold."""
     told = {}
     for check in verify(folder, Local(), **{"sample": 8} | more).checks:
         if told.get(check.what, ("",))[0] != "does not hold":

@@ -15,7 +15,7 @@ from flownav.core.errors import BEGIN, END, FlownavError
 
 
 class Done(NamedTuple):
-    """What became of it."""
+    """The result of a command."""
 
     returncode: int
     stdout: str
@@ -28,7 +28,7 @@ def printed(error: BaseException | None) -> str:
 
 
 def run(*arguments: object, cwd: Path = Path("."), columns: str = "80") -> Done:
-    """A command, typed in a folder, on a terminal of so many columns."""
+    """A command, typed in a folder, on a terminal of this number of columns."""
     out, told = io.StringIO(), io.StringIO()
     typed, environment = ["flownav", *map(str, arguments)], {"COLUMNS": columns}
     with chdir(cwd), patch.object(sys, "argv", typed), patch.dict(os.environ, environment):

@@ -1,4 +1,6 @@
-"""What several workers of the suite need is compiled by one of them: the others wait for its file in the cache."""
+"""Kernels that several workers of the suite need are compiled by one of them: the others wait for its file in the
+cache.
+"""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 
 class Done(NamedTuple):
-    """What became of a program."""
+    """The result of a program."""
 
     returncode: int
     stdout: str

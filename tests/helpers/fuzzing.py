@@ -1,4 +1,4 @@
-"""What fuzz tests share: how many mutants, what every reader promises of what it reads, and the promise itself."""
+"""Shared parts of fuzz tests: the number of mutants, and the promise of every reader about its result."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MOST = {
 
 
 def assert_sound(log: Log, most: Mapping[Sensor, float] = MOST, longer: float = 0.1) -> None:
-    """What every Log promises, however little of the file was left.
+    """Assert the promise of every Log, however little of the file was left.
 
     most: of each sensor's values; longer: by how much a quaternion may be.
     """

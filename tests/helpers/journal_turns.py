@@ -17,7 +17,7 @@ from live_ends import START_S, Hover, Wire
 
 
 class NoThread:
-    """What the writer's thread does at the end is done where somebody waits for it."""
+    """A thread whose work at the end is done where somebody waits for it."""
 
     def __init__(self, turns: Turns, target: Any) -> None:
         self._turns, self._target = turns, target
@@ -67,7 +67,7 @@ class Turns:
 
 
 def full_disk(monkeypatch: pytest.MonkeyPatch, after: int) -> None:
-    """Writing fails with ENOSPC once so many bytes are written, in the middle of a block."""
+    """Writing fails with ENOSPC once `after` bytes are written, in the middle of a block."""
     real, left = os.write, [after]
 
     def write(file: int, data: memoryview) -> int:

@@ -22,7 +22,7 @@ NAMES = tuple(
 
 
 def mutate_piece(piece: bytes, earlier: bytes, random: Random) -> list[bytes]:
-    """What arrives in place of a datagram."""
+    """The datagrams that arrive in place of one."""
     kind = random.randrange(7)
     if kind == 0:
         return [mutate(piece, earlier, random.randrange(1 << 30))]

@@ -55,7 +55,7 @@ class Hover:
         self.mav: Any = coder(self.system, 1)
 
     def frames(self, t_s: float) -> list[bytes]:
-        """What is sent in the step of 10 ms that ends at a time since the start."""
+        """The frames sent in the step of 10 ms that ends at a time since the start."""
         step, time_us = self.steps, round((self.boot_s + t_s) * 1e6)
         self.steps += 1
         if self.key is not None:
@@ -216,7 +216,7 @@ copyreg.pickle(struct.Struct, lambda packing: (struct.Struct, (packing.format,))
 
 
 def copied(wire: Wire) -> Wire:
-    """A wire that goes on as this one does, and shares nothing with it but the messages that were heard."""
+    """A wire that goes on as this one does, and shares nothing with it but the messages that were received."""
     return copy.deepcopy(wire, {id(message): message for message in wire.heard})
 
 

@@ -48,7 +48,7 @@ class LiveProcess:
         self.link.close()
 
     def fly(self, more: int, within_s: float = HUNG_S, beside: Callable[[], object] = lambda: None) -> LiveProcess:
-        """Talk until so many more estimates have come back; beside: called every 10 ms."""
+        """Talk until `more` further estimates have come back; beside: called every 10 ms."""
         until_s, wanted = time.monotonic() + within_s, self.told + more
         while self.told < wanted:
             assert time.monotonic() < until_s, f"{self.told} of {wanted} estimates after {within_s} s"

@@ -1,4 +1,4 @@
-"""What compiled code asks the linker for, and which of the package's functions are compiled."""
+"""The symbols that compiled code needs of the linker, and which of the package's functions are compiled."""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ def copied(project: Path) -> Iterator[Path]:
 
 
 def tested(tree: Path, tests: Sequence[str], project: Path) -> tuple[int, str]:
-    """pytest's exit status (1: a test failed; -1: too long) and the last of what it said."""
+    """pytest's exit status (1: a test failed; -1: too long) and the end of its output."""
     said = tree.parent / "said"
     process = WARM.Process(target=_run_tests, args=(tree, [f"tests/{test}" for test in tests], project, said))
     process.start()
@@ -230,7 +230,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("parts", nargs="*", help="only mutations in whose name or file one of these occurs")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="how many at a time")
-    parser.add_argument("--every", type=int, default=1, help="only each so many-th of them, as a sample")
+    parser.add_argument("--every", type=int, default=1, help="only each N-th of them, as a sample")
     arguments = parser.parse_args()
     try:
         kernels = Path(os.environ.get("FLOWNAV_CACHE") or Path.home() / ".cache" / "flownav")

@@ -108,7 +108,7 @@ def body_axes(yaw: np.ndarray, vector: np.ndarray) -> np.ndarray:
 
 @dataclass
 class Navigated:
-    """What the navigator made of a queue."""
+    """The navigator's outputs on a queue."""
 
     on: Running
     flown: Flown
@@ -172,7 +172,7 @@ class Navigated:
 
 
 def equipment(flown: Flown, queue: EventQueue, **settings) -> Equipment:
-    """What the streams offer."""
+    """The equipment of the streams."""
     return equipment_of(flown.streams, float(np.nanmin(queue.t_s)), False, NavigatorSettingsFile(**settings))
 
 

@@ -24,7 +24,7 @@ GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
 
 
 class Heard(NamedTuple):
-    """A reading: when it is handed over, and itself."""
+    """A reading: when it is passed on, and itself."""
 
     handed_s: float
     given: Given
@@ -44,7 +44,7 @@ def settings_of(flight: Flight, without: tuple[str, ...] = (), **pace: float) ->
 
 
 def arriving(flown: Flown, seed: int = 1, late_s: float = 0.03) -> list[Given]:
-    """The streams' readings as they come in: GPS is old, flow looked for a while, all are handed over a little late."""
+    """The streams' readings as they come in: GPS is old, flow looked for a while, all are passed on a little late."""
     random = np.random.default_rng(seed)
     heard = []
     for sensor, stream in flown.streams.items():

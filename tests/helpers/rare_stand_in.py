@@ -25,5 +25,5 @@ def walker_of(seed, shaped=lambda total: total):
 
 
 def limit_of(probability):
-    """What the sum exceeds with this probability."""
+    """The limit that the sum exceeds with this probability."""
     return float(norm.isf(probability))

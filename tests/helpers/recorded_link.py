@@ -28,7 +28,7 @@ class Arrival(NamedTuple):
 
 
 class Sent(NamedTuple):
-    """What the session said and when, decoded."""
+    """A message that the session sent and when, decoded."""
 
     now_s: float
     message: Any

@@ -93,7 +93,9 @@ def flight(scenario: str = "landing", seed: int = 1, gps_sigma_m: float = 0.3) -
 
 
 def navigated(seed: int = 1) -> Record:
-    """The landing on the navigator: its estimate of other instants than the truth's, 2 m off, and what was flown on."""
+    """The landing on the navigator: its estimate of other instants than the truth's, 2 m off, and the estimate used
+    by the autopilot.
+    """
     record = flight("landing", seed)
     truth, estimate = record.tables["truth"], record.tables.pop("estimate")
     t_s = 0.06 + np.cumsum(np.random.default_rng(seed).uniform(0.02, 0.03, 1900))
@@ -105,7 +107,10 @@ def navigated(seed: int = 1) -> Record:
     flown["pos_e_m"] = flown["pos_e_m"] + np.where(truth["t_s"] > 15.0, 1.0, 0.0)  # as a pad is found
     attitude = {name: truth[name] for name in ("qw", "qx", "qy", "qz")}
     record.add("flown", {"t_s": truth["t_s"], **flown, **attitude})
-    record.manifest |= {"filter": "landing", "known_exactly": "where it hovers for its first 5 s, flown on the truth"}
+    record.manifest |= {
+        "filter": "landing",
+        "known_exactly": "its position in hover for the first 5 s (true state used)",
+    }
     return record
 
 

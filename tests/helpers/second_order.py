@@ -1,4 +1,4 @@
-"""What a fitted second-order model's natural frequency and damping are, each with its interval."""
+"""Natural frequency and damping of a fitted second-order model, each with its interval."""
 
 from __future__ import annotations
 

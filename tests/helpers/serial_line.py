@@ -75,13 +75,15 @@ class Uart(Link):
         self._out += frame
 
     def goes_out(self) -> bytes:
-        """What has gone out onto the line since it was last asked."""
+        """Bytes that have gone out onto the line since the last call."""
         many = self._out_pace.may(self._clock())
         piece, self._out = self._out[:many], self._out[many:]
         return self._out_pace.passed(piece)
 
     def comes_in(self, take: Callable[[int], bytes]) -> bytes:
-        """What has come from the line since it was last asked. take: so many bytes of what was written, at most."""
+        """Bytes that have come from the line since the last call. take: returns at most this number of the written
+        bytes.
+        """
         many = self._in_pace.may(self._clock())
         return self._in_pace.passed(take(many)) if many else b""
 
@@ -136,12 +138,12 @@ class VirtualUart(Uart):
         return self._always_ready  # the loop waits for nothing
 
     def take(self, content: bytes) -> int:
-        """What the session writes."""
+        """Take the bytes that the session writes."""
         self._waiting += content
         return len(content)
 
     def read(self, most: int) -> bytes:
-        """What has come by the next step of the clock."""
+        """Bytes that have come by the next step of the clock."""
         self.now_s += STEP_S
         heard = self._vehicle.hear(self.comes_in(self._taken), self.now_s)
         for frame in [*heard, *self._vehicle.due(self.now_s, UNIX_S + self.now_s)]:
@@ -176,7 +178,7 @@ class VirtualSerialLink(SerialLink):
 
 
 class Flown(NamedTuple):
-    """What became of a flight over the line, all after SETTLED_S of it.
+    """The result of a flight over the line, all after SETTLED_S of it.
 
     Rates [bytes/s]; lost: frames that the UART's buffer did not take; ages [s]: of the newest reading when an estimate
     is due, and of an estimate when it arrives; error_m: horizontal position of what arrived, less its mean;
@@ -211,7 +213,7 @@ class Watched(Session):
 
 
 class Flight:
-    """A session at our end of a line; it is watched once it has settled, until so many seconds have passed."""
+    """A session at our end of a line; it is watched once it has settled, for a given time."""
 
     def __init__(
         self, vehicle: SimulatedVehicle, uart: Uart, link: Link, options: Options, clock: Callable[[], float]
@@ -230,7 +232,7 @@ class Flight:
         return self.link.received, self.link.written, self.uart.dropped
 
     def fly(self, seconds: float, estimates: int = 0) -> None:
-        """Until so many seconds have passed and so many estimates have arrived, or the vehicle's flight is over."""
+        """Run until this time has passed and this number of estimates has arrived, or the vehicle's flight is over."""
 
         def stop() -> bool:
             now_s = self.clock() - self.began_s
@@ -249,7 +251,7 @@ class Flight:
         return [(t_s, m) for t_s, m in received if m.msgname == "ODOMETRY" and t_s > SETTLED_S]
 
     def flown(self, baud: int) -> Flown:
-        """What became of it."""
+        """The result of the flight."""
         vehicle, session, lasted_s = self.vehicle, self.session, self.lasted_s
         assert self._settled is not None
         received, written, dropped = (now - then for now, then in zip(self.counts(), self._settled, strict=True))
@@ -308,7 +310,7 @@ def fly_over(baud: int, vehicle: SimulatedVehicle, seconds: float, options: Opti
 
 
 def options_of(setup: Any, baud: int) -> Options:
-    """What a session needs to know of a simulated flight."""
+    """The session's options that a simulated flight needs."""
     from flownav.sensors.datasheet import IdentifiedFlow
 
     ages_s = setup.fitted.ages_s

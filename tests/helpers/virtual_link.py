@@ -26,7 +26,7 @@ class Clock:
 
 
 class VirtualLink(Link):
-    """Datagrams between a session and what answers at the other end; both live in the clock's time.
+    """Datagrams between a session and the other end that answers; both live in the clock's time.
 
     told: what arrives by an instant. hear: what is answered to a frame at an instant.
     """
@@ -62,5 +62,5 @@ class VirtualLink(Link):
 
 
 def link_to(vehicle: SimulatedVehicle, clock: Clock) -> VirtualLink:
-    """A link to a simulated vehicle, told in the clock's time."""
+    """A link to a simulated vehicle, run in the clock's time."""
     return VirtualLink(clock, lambda now_s: vehicle.due(now_s, UNIX_S + now_s), vehicle.hear)

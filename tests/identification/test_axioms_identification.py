@@ -1,4 +1,4 @@
-"""What time and units demand of identification: a sensor that is late, and says so, is the same sensor."""
+"""Invariances of identification, time and units: a sensor that states its delay is the same sensor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a second-order fit's estimates and intervals are worth, against a bound computed without flownav."""
+"""The quality of a second-order fit's estimates and intervals, against a bound computed without flownav."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What only looks like a scale: a wrong interval, and an offset that is fixed in the body's axes."""
+"""Errors that only look like a scale: a wrong interval, and an offset that is fixed in the body's axes."""
 
 from __future__ import annotations
 

@@ -347,7 +347,9 @@ def test_a_gain_that_may_be_one_is_left_alone(found):
 
 
 def poorly_seen(found, identifiable, unseen=(60.0,)):
-    """The findings of a log whose input shows so many parameters, and whose model does so well on unseen data."""
+    """The findings of a log whose input shows this number of parameters, and whose model has this fit on unseen
+    data.
+    """
     response = found.responses[0]
     shown = response.choice.excitation._replace(identifiable=identifiable, verdict=f"{identifiable} of 3 shown")
     tried = tuple((fit, shown) for fit, _ in response.choice.tried)

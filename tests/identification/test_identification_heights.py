@@ -49,7 +49,7 @@ def test_five_robust_deviations_of_a_normal_error_are_five_of_its_standard_devia
 
 
 def noisy_points(random, heights, readings, scatter=0.0):
-    """Standard deviations as so many normal readings give them, of the law 0.05 h^1.5, each off by a factor."""
+    """Standard deviations as this number of normal readings gives them, of the law 0.05 h^1.5, each off by a factor."""
     return [
         NoisePoint(h, float(0.05 * h**1.5 * np.exp(scatter * random.standard_normal()) *
                             np.std(random.standard_normal(readings))), readings)

@@ -244,7 +244,7 @@ def test_what_hardly_moved_gives_a_model_that_knows_it_and_no_warning(which):
     found = fit([experiment("log", t_s, u, t_s, y)], structure)
     assert np.isfinite(found.covariance).all()
     assert (np.diag(found.covariance) >= np.diag(found.white_covariance)).all()
-    assert found.covariance.max() > 1e3  # it is told that the delay is not known
+    assert found.covariance.max() > 1e3  # the stated delay is not known
 
 
 # -- held-out data -------------------------------------------------------------------------------------------

@@ -229,7 +229,7 @@ def test_noise_alone_fixes_nothing():
     assert "fixes none" in shown.verdict
 
 
-# What the intervals are worth
+# The quality of the intervals
 
 
 def monte_carlo(structure, system, delay_s, gain_of, fits):

@@ -54,7 +54,7 @@ def test_what_is_wrong_with_the_reference_is_named_and_the_gains_are_right(tmp_p
     notes = [note for note in found.notes if note.startswith(("the reference:", "truth.csv leaps"))]
     named = [note for note in notes if said and said in note]
     assert len(named) == bool(said)
-    assert said or not notes  # one that stood still leaps when it goes on, which is told as well
+    assert said or not notes  # one that stood still leaps when it goes on, which is noted as well
     for note in named:
         assert min(abs(float(word) - FROM_S) for word in note.split() if word[0].isdigit()) < 1.1
     for response, gain in zip(found.responses, (GAIN_X, GAIN_Y), strict=True):

@@ -1,5 +1,6 @@
-"""What time and north demand of a live session: lags and clocks that may begin anywhere, patience that ends, covariance
-that turns with the vehicle."""
+"""Invariances of a live session, time and north: lags and clocks that may begin anywhere, patience that ends,
+covariance that turns with the vehicle.
+"""
 
 from __future__ import annotations
 
@@ -97,7 +98,7 @@ def test_the_horizon_takes_what_is_of_the_very_instant_that_it_has_released(star
 
 # -- the vehicle's clock ------------------------------------------------------------------------------------------
 def stamped_clock(boot_s: float, ours_s: float, wait_s: float) -> VehicleClock:
-    """A vehicle that has been up for boot_s when our clock shows ours_s, heard for a second over a link."""
+    """A vehicle that has been up for boot_s when our clock shows ours_s, received for a second over a link."""
     clock = VehicleClock(1, 1)
     for k in range(50):
         stamp_ms = round((boot_s + 0.02 * k) * 1e3) % 2**32
@@ -281,7 +282,7 @@ def test_the_least_wait_on_the_link_is_forgotten_after_two_windows():
 
 @pytest.mark.parametrize("told", [(25.0001, 55.0002, 13.0), (24.9995, 54.9999, 4.0)])
 def test_a_place_is_the_same_in_the_navigator_s_frame_and_in_the_autopilot_s(told):
-    """The origin that is told later, north, east and higher or lower: with the offset it is one spot of the earth."""
+    """The origin that is sent later, north, east and higher or lower: with the offset it is one spot of the earth."""
     origin, fix = Origin(), (25.0, 55.0, 10.0)
     assert origin.fixed(fix) == ""
     assert origin.told(told) == "moved"

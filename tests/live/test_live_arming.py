@@ -51,7 +51,7 @@ def answered(monkeypatch):
 
 
 def test_without_gps_and_origin_an_ardupilot_does_not_fit():
-    """It said "fits", and the vehicle could not be armed."""
+    """The verdict was "fits", and the vehicle could not be armed."""
     found, _ = checked(ARDUPILOT, ardupilot(**INDOORS))
     assert found.ready.without_gps
     assert found.ready.missing == (NEEDS_ORIGIN,)
@@ -126,7 +126,7 @@ COMPASSES_OFF = {"COMPASS_USE": 0, "COMPASS_USE2": 0, "COMPASS_USE3": 0}
     ],
 )
 def test_a_heading_by_a_compass_that_is_off_blocks_arming(compass, needs):
-    """EK3_SRC1_YAW 1 was "ok", and the vehicle was said to fit."""
+    """EK3_SRC1_YAW 1 was "ok", and the vehicle was reported to fit."""
     found, _ = checked(ARDUPILOT, ardupilot(**compass))
     assert found.fits == (needs is None)
     said = [block.says for block in found.blocks]

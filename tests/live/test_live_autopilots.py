@@ -1,4 +1,6 @@
-"""Who is taken for the vehicle's autopilot, whoever is heard first: no single HEARTBEAT is believed for good."""
+"""Which sender is taken for the vehicle's autopilot, whatever is received first: no single HEARTBEAT is believed for
+good.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,7 @@ MOVES, PLACES = 105, 24  # HIGHRES_IMU, GPS_RAW_INT
 
 
 class Notes(Keeper):
-    """What the session said."""
+    """The notes of the session."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -127,7 +129,7 @@ def test_after_an_estimate_was_sent_a_better_one_is_only_said(wires):
 
 
 def test_an_autopilot_that_sends_nothing_unasked_is_asked_in_its_turn(wires):
-    """Two are heard, and neither tells anything: each is asked for its streams, one after the other."""
+    """Two are received, and neither sends anything else: each is asked for its streams, one after the other."""
     wire = wires()
     wire.fly(3.0 * TURN_S, silent=True, beside=beats(wire, (9, 1, QUADROTOR, PX4), (1, 1, QUADROTOR, PX4)))
     asked = {m.target_system for m in wire.heard if m.msgname == "COMMAND_LONG"}

@@ -21,7 +21,7 @@ def flown(data_folder):
 
 
 def test_it_arms_flies_and_lands_without_a_gap(flown):
-    assert flown.t_s[0] - 6.1 < 5.0  # first heard at 6.1 s
+    assert flown.t_s[0] - 6.1 < 5.0  # first received at 6.1 s
     assert flown.longest_gap_s(0.0) < 0.2
     assert set(flown.session.withheld) <= {"listening", "unprotected"}
     assert np.abs(flown.error_m[:, 2]).max() < 0.3
@@ -34,7 +34,7 @@ def test_the_square_is_within_a_metre(flown):
 
 
 def from_second(since_s, beside=lambda heard, truth: heard):
-    """What is heard by a session that begins so long after the recording did."""
+    """The messages received by a session that begins `since_s` after the recording did."""
 
     def heard_since(heard, truth):
         heard = list(beside(heard, truth))
@@ -51,7 +51,7 @@ def from_second(since_s, beside=lambda heard, truth: heard):
     ],
 )
 def test_a_session_that_begins_in_flight_without_gps_knows_its_height(data_folder, folder, since_s, height_m, beside):
-    """It was killed and started again: it said 0 down, with a deviation of 0.2 m, at 3 and 6 m of height."""
+    """It was killed and started again: it sent 0 down, with a deviation of 0.2 m, at 3 and 6 m of height."""
     found = Played(data_folder / folder, since_s + 6.0, beside=from_second(since_s, beside))
     assert len(found.t_s) > 50
     told_m = [message.z for _, message in found.sent if message.msgname == "ODOMETRY"]

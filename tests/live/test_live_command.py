@@ -78,7 +78,7 @@ def test_a_full_disk_in_flight_is_said_and_the_session_goes_on(tmp_path, monkeyp
 def test_nobody_heard_is_a_bad_verdict_and_leaves_nothing(tmp_path, monkeypatch):
     done = run_live(monkeypatch, "--duration", "0.5", "--json", "--record", tmp_path / "live.fnr")
     assert isinstance(done.exception, VerdictError)
-    assert str(done.exception).startswith("udp:0: no autopilot was heard in 0.5 s")
+    assert str(done.exception).startswith("udp:0: no autopilot was received in 0.5 s")
     facts = json.loads(done.stdout)
     assert facts["vehicle"] is None
     assert facts["record"] is None

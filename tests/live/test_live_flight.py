@@ -69,7 +69,7 @@ def assert_same_bits(path):
 
 @pytest.fixture(scope="module")
 def simulated():
-    """The flight of pad_return as a log, and what a session is told of it."""
+    """The flight of pad_return as a log, and the session's options."""
     warm_up()
     setup = assemble(load_scenario("pad_return"))
     told, ages_s = setup.fitted.told, setup.fitted.ages_s
@@ -129,7 +129,7 @@ def test_a_flight_told_over_loopback_is_followed(simulated, tmp_path):
 
 
 def test_a_vehicle_is_told_at_a_multiple_of_its_pace(simulated):
-    """Its loop: what is due by then goes out, and what is heard is answered."""
+    """Its loop: what is due by then goes out, and received messages are answered."""
     vehicle, clock, sent = SimulatedVehicle(simulated[0]), Clock(), []
     asked = bytes(coder(1, 197).timesync_encode(0, 77).pack(coder(1, 197)))
     link = VirtualLink(clock, lambda now_s: [asked] if not sent else [])
@@ -313,7 +313,7 @@ def test_a_sensor_that_was_heard_and_hardly_fused_is_a_bad_verdict_of_the_replay
     run = replayed(path)
     said = [finding.text for finding in run.findings if finding.unfused]
     assert len(said) == 2
-    assert said[0].startswith("gps_position was heard and hardly fused (")
+    assert said[0].startswith("gps_position was received and hardly fused (")
     result = typed("replay", path, "--out", tmp_path / "again.fnr", "--report")
     assert result.returncode == 1
     assert "hardly fused" in result.stderr

@@ -25,7 +25,7 @@ class Flagged(Keeper):
 
 
 class Glitching(Hover):
-    """`says(chance)` gives rate and force while `when(t_s)` holds; it never does before it is told when."""
+    """`says(chance)` gives rate and force while `when(t_s)` holds; it never does before `when` is set."""
 
     def when(self, t_s):
         return False

@@ -68,7 +68,7 @@ def test_a_stuck_accelerometer_is_known_within_a_tenth_of_a_second():
     at_s, swap = found
     assert 1.0 <= at_s < 1.1
     assert swap.barred == FIRST
-    assert swap.since_s <= 1.0 - 0.5 * BEFORE_S  # what it said while an autopilot's filter settled goes, too
+    assert swap.since_s <= 1.0 - 0.5 * BEFORE_S  # readings while an autopilot's filter settled are dropped, too
     assert swap.others == []
 
 
@@ -259,7 +259,7 @@ def test_another_flies_on_while_the_first_is_stuck_however_the_vehicle_jolts(veh
 
 
 class Silenced(JoltedWithTwo):
-    """In place of being stuck its first IMU says nothing, in six zeros, though all of them are said to be new."""
+    """In place of being stuck its first IMU sends six zeros, though all of them are marked as new."""
 
     def stuck(self, rates, step):
         return (0.0,) * 6

@@ -358,7 +358,7 @@ def test_the_command_numbers_its_record_and_replaces_one_only_where_it_may(tmp_p
 
     before = path.read_bytes()
     kind, words = refused(path)
-    assert kind is VerdictError  # nobody was heard
+    assert kind is VerdictError  # no vehicle was received
     assert "flight-1.fnr" in words
     kind, words = refused(path, "--force")
     assert kind is VerdictError

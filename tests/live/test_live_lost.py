@@ -28,7 +28,7 @@ def played(data_folder):
 def test_a_vehicle_without_gps_is_sent_an_estimate_within_seconds(played):
     """ArduPilot tells of a receiver that it does not have; a navigator waited for its fix, and nobody could arm."""
     found = played("no-gps-never-sends", 40.0)
-    assert found.t_s[0] - 17.8 < 5.0  # the vehicle's time when it is first heard
+    assert found.t_s[0] - 17.8 < 5.0  # the vehicle's time when it is first received
     assert found.longest_gap_s(0.0) < 0.2
     assert np.abs(found.error_m).max() < 0.15
     assert not found.session.hearing.gps_heard

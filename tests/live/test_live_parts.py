@@ -176,7 +176,7 @@ def test_timesync_tells_the_wait_that_stamps_cannot():
 
 @pytest.mark.parametrize("wait_s", [0.02, 0.08, 0.2])
 def test_the_time_never_steps_back_when_the_link_is_loaded_and_is_right_again_soon(wait_s):
-    """A flood of messages in the queue: everything seems to be told later, all of a sudden."""
+    """A flood of messages in the queue: everything seems to arrive later, all of a sudden."""
     clock, said_s = VehicleClock(1, 1), []
     for k in range(500):
         now_s = 100.0 + 0.01 * k

@@ -165,7 +165,7 @@ def test_nobody_heard_is_a_bad_verdict_and_leaves_nothing(tmp_path):
     command += ["--record", str(tmp_path / "live.fnr")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 1
-    assert "udp:0: no autopilot was heard in 0.5 s" in done.stderr.splitlines()[-1]
+    assert "udp:0: no autopilot was received in 0.5 s" in done.stderr.splitlines()[-1]
     facts = json.loads(done.stdout)
     assert facts["vehicle"] is None
     assert facts["record"] is None

@@ -1,4 +1,6 @@
-"""What a link carries: rates that fit, in the stated order; whole frames at the line's pace, and no old estimate."""
+"""The rates that a link carries: rates that fit, in the stated order; whole frames at the line's pace, and no old
+estimate.
+"""
 
 from __future__ import annotations
 

@@ -135,7 +135,7 @@ def test_gps_later_than_the_longest_horizon_is_an_alarm_and_nothing_is_sent(link
 
 
 def test_after_a_freeze_of_a_second_it_sends_again_within_three(rebooted):
-    """The vehicle stands still for 1 s and its clock with it: what TIMESYNC told before is 0.9 s off since."""
+    """The vehicle stands still for 1 s and its clock with it: the offset from TIMESYNC is 0.9 s off since."""
     frames, _, sent = rebooted
     before = [one for one in sent if one.now_s < frames[0].now_s + 80.0]  # the reboot comes later
     flying_s = frames[0].now_s + FIX_S + 2.0
@@ -163,7 +163,7 @@ def test_a_timesync_that_lies_does_not_stop_the_sending(link):
 
 
 def test_after_a_reboot_the_streams_are_asked_for_again(rebooted):
-    """It comes back with all rates 0, and only HEARTBEAT and TIMESYNC are heard."""
+    """It comes back with all rates 0, and only HEARTBEAT and TIMESYNC are received."""
     frames, session, sent = rebooted
     rebooted_s = frames[0].now_s + 95.5
     asked = [(now_s, message) for now_s, message in sent_of(sent, "COMMAND_LONG") if now_s > rebooted_s]

@@ -24,7 +24,7 @@ def taken(repeats, source, messages, step_s, since_s=0.0):
 
 
 def test_one_of_five_copies_is_taken_once_the_pace_is_known():
-    """10 Hz told at 50, and a height of the filter's that differs in each copy."""
+    """10 Hz sent at 50, and a height of the filter's that differs in each copy."""
     messages = [flow(0.01 * (k // 5), 1.0 + 0.001 * k) for k in range(500)]
     found = taken(Repeats(), FLOW, messages, 0.02)
     assert found[::5] == [True] * 100

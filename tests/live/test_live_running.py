@@ -1,4 +1,6 @@
-"""What keeps a session's estimates in time: the collector, the start's backlog, scheduling, the screen's process."""
+"""The means that keep a session's estimates in time: the collector, the start's backlog, scheduling, the screen's
+process.
+"""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ def assert_all_good(wire, at_least=1):
 
 
 def test_a_copied_session_goes_on_as_one_that_was_never_copied(wires):
-    """What most tests here begin with; another copy of it that flies otherwise in between changes nothing."""
+    """The start of most tests here; another copy of it that flies otherwise in between changes nothing."""
     whole, wire, other = wires().fly(6.0), hovering(4), hovering(4)
     for _ in range(4):
         other.fly(0.5, silent=True)
@@ -308,7 +308,7 @@ def test_an_uncertain_estimate_is_not_sent(wires):
 
 
 def shown(wire):
-    """What the screen says."""
+    """The screen's text."""
     console = Console(width=160, file=StringIO(), record=True)
     console.print(draw(Screen(wire.session, Latency(), "udp:1").view(wire.now_s)))
     return console.export_text()
@@ -327,7 +327,7 @@ def test_while_a_fault_is_suspected_nothing_is_sent_and_the_screen_names_it():
     assert "suspected" not in shown(wire)
     wire.fly(12.0, beside=drift)
     assert "suspected: GPS drift north" in told["screen"]
-    assert "withheld: innovations tell of a sensor that fails" in told["screen"]
+    assert "withheld: innovations show that a sensor fails" in told["screen"]
     assert 12.0 < told["t_s"] < 20.0
     assert wire.estimates(told["t_s"] - 1.0)
     assert not wire.estimates(told["t_s"] + 0.02)
@@ -588,7 +588,7 @@ def test_an_imu_that_comes_late_serves(wires):
 
 
 class Standing(Hover):
-    """On the ground, indoors: landed, a flow sensor that sees nothing, and a range too short to be told."""
+    """On the ground, indoors: landed, a flow sensor that sees nothing, and a range too short to be measured."""
 
     def frames(self, t_s):
         step = self.steps

@@ -49,7 +49,7 @@ def test_a_line_carries_what_is_asked_of_it(flight, baud):
 
 
 def test_a_slow_line_that_everything_is_asked_of_loses_frames_and_grows_old(flight):
-    """What the plan is for; and that the line above is one that can lose."""
+    """The reason for the plan; and that the line above is one that can lose."""
     log, setup = flight
     asked = replace(options_of(setup, 57_600), capacity_bytes_s=None)
     flown = fly_virtually(57_600, SimulatedVehicle(log), FLOWN_S, asked)

@@ -323,7 +323,7 @@ def test_where_the_user_must_choose_nothing_is_written():
 def test_no_vehicle_is_a_verdict():
     link = FakeLink(None)
     report = check(Talk(link, clock=link.clock, wait=link.wait), UDP, "odometry")
-    assert report.verdict.startswith("nothing was heard in 10 s")
+    assert report.verdict.startswith("nothing was received in 10 s")
     assert not report.fits
 
 
@@ -341,7 +341,7 @@ def test_a_signed_vehicle_is_read_with_the_key_and_one_that_does_not_sign_is_not
         talk = Talk(link, key=key, clock=link.clock, wait=link.wait)
         report = check(talk, UDP, "odometry")
         assert report.fits == signs
-        assert signs or "something is heard (unsigned 1" in report.verdict
+        assert signs or "something is received (unsigned 1" in report.verdict
 
 
 def test_parameters_that_a_real_ardupilot_told(data_folder):
@@ -536,7 +536,7 @@ def test_mistakes_are_one_line(options, said, tmp_path, monkeypatch):
 
 
 def test_a_gimbal_that_says_it_is_an_autopilot_is_not_written_to():
-    """It is heard first, a second before the autopilot."""
+    """It is received first, a second before the autopilot."""
     link = FakeLink(FakeAutopilot(ARDUPILOT, {"A": 1}))
     mav = coder(1, 154)
     link._to_us.append(bytes(mav.heartbeat_encode(2, ARDUPILOT, 0, 0, 4, 3).pack(mav)))

@@ -1,4 +1,4 @@
-"""What the screen says of readings: a component that a sensor does not have is no fault of it."""
+"""The screen's words on readings: a component that a sensor does not have is no fault of it."""
 
 from __future__ import annotations
 

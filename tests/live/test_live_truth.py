@@ -1,4 +1,4 @@
-"""A simulator is asked for the truth, a vehicle is not; what is told of it is kept."""
+"""A simulator is asked for the truth, a vehicle is not; the received truth is kept."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_ardupilots_simulator_is_asked_for_the_truth_and_it_is_kept():
     assert autopilot.asked.count(108) == 1
     assert autopilot.interval_s == pytest.approx(0.04)
     assert len(autopilot.keeper.truths) > 20
-    assert autopilot.parameters_asked == 3  # the first two were not heard
+    assert autopilot.parameters_asked == 3  # the first two were not received
 
 
 def test_a_vehicle_is_not_asked_for_it():

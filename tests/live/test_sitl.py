@@ -116,7 +116,7 @@ def test_flights_beside_each_other_have_slots_of_their_own(tmp_path, monkeypatch
     with a_slot() as again:
         assert again == first
     monkeypatch.setattr(campaign, "MOST_SLOT", campaign.FIRST_SLOT)
-    with a_slot(), pytest.raises(InputError, match="flown on this machine already"), a_slot():
+    with a_slot(), pytest.raises(InputError, match="already fly on this machine"), a_slot():
         pass
 
 
@@ -322,7 +322,7 @@ def test_a_tilted_sensor_looks_farther():
 
 # -- the second receiver of GPS ------------------------------------------------------------------------------------
 class Listener:
-    """A wire on which the truth is known, and what is said is kept."""
+    """A wire on which the truth is known, and messages are kept."""
 
     def __init__(self, true: TrueState):
         self.history, self.turns, self.said = History(), [], []

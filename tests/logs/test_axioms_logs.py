@@ -1,4 +1,4 @@
-"""What time demands of readers: a log whose clock is shifted, or turns over, is the same flight; ends are held."""
+"""Invariances of readers, time: a log whose clock is shifted, or wraps, is the same flight; ends are held."""
 
 from __future__ import annotations
 

@@ -115,7 +115,7 @@ def test_what_says_that_it_stands_and_where_its_nose_truly_was(folder):
     t_s = np.arange(0.0, 29.0, 0.5)
     write_table(folder / "heading_truth.csv", {"t_s": t_s, "yaw_rad": 0.3 * t_s})
     log = read_csv_folder(folder)
-    assert log.streams[Sensor.LANDED].value.tolist() == [[1.0], [0.0], [1.0]]  # however seldom, it is said in seconds
+    assert log.streams[Sensor.LANDED].value.tolist() == [[1.0], [0.0], [1.0]]  # however seldom, it is stated in seconds
     assert log.heading_truth["yaw_rad"] == pytest.approx(0.3 * t_s)
     assert {"landed.csv", "heading_truth.csv"} <= set(log.inputs)
 

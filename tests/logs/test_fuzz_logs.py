@@ -175,7 +175,7 @@ def damaged(sample: Sample, seed: int) -> tuple[str, bytes]:
 @pytest.mark.fuzz
 @pytest.mark.parametrize("name", NAMES)
 def test_a_damaged_log_is_read_or_refused(at_hand, tmp_path, name):
-    """By its reader, and every other one as any log, told from what is left of it."""
+    """By its reader, and every other one as any log, recognised from the rest of it."""
     if name not in at_hand:
         pytest.skip(f"the recorded logs hold no sample: {name}")
     sample = at_hand[name]

@@ -25,7 +25,7 @@ from flownav.report.html import render
 from fuzzing import FIRST_SEED, MUTANTS, assert_promise, assert_sound
 from record_mutations import mutate_record
 
-REPLAYED_EACH, SHOWN_EACH = 5, 10  # of so many mutants one is replayed, and one reported and exported
+REPLAYED_EACH, SHOWN_EACH = 5, 10  # of this number of mutants one is replayed, and one reported and exported
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def replayed(path: Path) -> Replay:
 
 
 def assert_finite(flown: Replay) -> None:
-    """What a replay promises of whatever it was fed."""
+    """Assert the promise of a replay about any input."""
     assert np.isfinite(flown.estimate).all()
     assert np.all(np.diff(flown.said.t_s) >= 0.0)
     flown.scores()

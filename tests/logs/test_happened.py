@@ -1,4 +1,4 @@
-"""What a log says besides its sensors: parameters, modes, source sets, messages, clipping, from three formats."""
+"""A log's content besides its sensors: parameters, modes, source sets, messages, clipping, from three formats."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ def test_a_file_cut_off_anywhere_holds_every_block_before_the_cut():
 
 
 def test_a_tail_of_zeros_is_a_torn_tail():
-    """What a file system leaves after a power cut: the length is there, the bytes are not."""
+    """The file after a power cut: the length is there, the bytes are not."""
     parts = read(FILE + bytes(5000))
     assert numbers(parts) == [0, 1, 2, 3]
     assert parts[-1] == Damage(len(FILE), 5000, True)

@@ -227,7 +227,7 @@ def test_flow_velocity_beside_flow_rate_is_left_out(path):
     log = flight_log(autopilot=PX4)
     found = read_tlog(log.write(path))
     assert Sensor.FLOW_VELOCITY not in found.streams
-    assert "flow_velocity is left out: flow_rate tells of the same flow" in notes(found)
+    assert "flow_velocity is left out: flow_rate is of the same flow" in notes(found)
 
 
 # -- clocks ------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""What a path holds is told from its first bytes; what is no log is said with what would be."""
+"""The kind of a path is recognised from its first bytes; a path that is no log is refused with the kinds that are."""
 
 from __future__ import annotations
 

@@ -80,7 +80,7 @@ def test_every_sensor_reads_as_in_the_csv_folder(bags, folder, name):
 
 
 def test_a_receiver_whose_bag_has_no_velocity_topic_has_no_velocity(flown, tmp_path):
-    """Not one that was heard and never fused, which ends a replay with a warning and status 1."""
+    """Not one that was received and never fused, which ends a replay with a warning and status 1."""
     made = ros_flight(flown.tables)
     made.rows = [row for row in made.rows if "gps_vel" not in row[1]]
     log = open_log(made.write(tmp_path / "mcap"))
@@ -199,7 +199,7 @@ def test_px4_and_motion_capture_in_one_bag_share_px4s_clock(flown, truth, tmp_pa
 
 
 def test_a_bag_that_was_cut_off_is_read_as_far_as_it_goes(bags, tmp_path):
-    """What a computer leaves that lost its power: no index, no footer, a chunk in the middle."""
+    """The bag of a computer that lost its power: no index, no footer, a chunk in the middle."""
     content = bags["mcap file"].read_bytes()
     (tmp_path / "cut.mcap").write_bytes(content[: len(content) // 2])
     log = read_ros(tmp_path / "cut.mcap")

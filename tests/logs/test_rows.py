@@ -1,4 +1,4 @@
-"""Rows out of order, said twice or far from all others: which go, which stay, and that they are counted."""
+"""Rows out of order, repeated or far from all others: which go, which stay, and that they are counted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What time demands of a vehicle's clock: any start, any number of wraps, and a wrap like no wrap."""
+"""Invariances of a vehicle's clock: any start, any number of wraps, and a wrap like no wrap."""
 
 from __future__ import annotations
 

@@ -155,7 +155,7 @@ def test_keys_of_another_length_are_a_programmers_mistake():
     (0.0, 59.0, True), (0.0, 61.0, False), (600.0, 59.0, True), (600.0, 61.0, False), (600.0, 540.0, False)
 ])  # fmt: skip
 def test_the_minute_of_a_new_stream_counts_from_now_and_not_from_when_the_session_began(passed_s, old_s, taken):
-    """What was recorded after the session began is old too, once a minute has passed."""
+    """A recording from after the session's start is old too, once a minute has passed."""
     shown_s = [100.0]
     check = SignatureCheck(KEY, NOW, lambda: shown_s[0])
     shown_s[0] += passed_s
@@ -164,7 +164,7 @@ def test_the_minute_of_a_new_stream_counts_from_now_and_not_from_when_the_sessio
 
 
 def test_a_known_stream_may_lag_behind_as_long_as_it_goes_on():
-    """A vehicle without GPS time keeps the time that it was given, and is heard all the same."""
+    """A vehicle without GPS time keeps the time that it was given, and is accepted all the same."""
     shown_s = [0.0]
     check, mav = SignatureCheck(KEY, NOW, lambda: shown_s[0]), signer(unix_s=NOW - 30.0)
     assert check.accepts(packed(mav))

@@ -1,4 +1,4 @@
-"""What time, north, energy and scale demand of the navigator, law by law: plain functions of plain floats."""
+"""Invariances of the navigator, law by law, as plain functions: time, north, energy and scale."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What lies below walks: with new ground that passes below, and with what lasts in a sensor's error as the height
+"""The ground below walks: with new ground that passes below, and with a sensor's lasting error as the height
 changes.
 """
 

@@ -1,4 +1,4 @@
-"""What follows from a reading's fate, as functions of plain records: resets, aids, a pad, a compass, a start."""
+"""The consequences of a reading's fate, as functions of plain records: resets, aids, a pad, a compass, a start."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ from navigation_streams import fly, navigate
 
 SEED = 5
 SETTLED = 500  # epochs
-# m/s (docs/explanation/landing-filter.md): sixteen gusty landings, at the horizon and flown on, with delay or states
+# m/s (docs/explanation/landing-filter.md): sixteen gusty landings, at the horizon and at present, with delay or states
 IN_LANDINGS = {
     "2 Hz, damping 0.7": ((0.0205, 0.0224), (0.0207, 0.0225)),
     "2 Hz, damping 1.5": ((0.0217, 0.0306), (0.0216, 0.0235)),
@@ -101,7 +101,9 @@ def flight_with(setup, *, lagged):
 
 
 def velocity_rms_m_s(flight):
-    """Horizontal velocity error of sixteen flights: where the navigator stands, and of now, as it is flown on."""
+    """Horizontal velocity error of sixteen flights: at the navigator's horizon, and at present, as the autopilot
+    uses it.
+    """
     buffers = buffers_of(flight, LANES, flight.plan.epochs, written=False)
     fly_into(flight, SEED, 0, LANES, buffers)
     names = ("vel_u_m_s", "vel_v_m_s")
@@ -164,7 +166,7 @@ def test_a_user_who_wants_no_states_gets_the_delay_back():
 # -- what is compiled -------------------------------------------------------------------------------------------
 @equation
 def mark(work, lanes, lag):
-    """What no compiler can type stands where only lagged lanes come."""
+    """A branch that no compiler can type stands where only lagged lanes come."""
     if lag is not None:
         work[0] = lanes.no_such_thing
     else:
@@ -268,7 +270,7 @@ def worth(tmp_path_factory):
         setup = setup_with(folder, name)
         found[name] = [velocity_rms_m_s(flight_with(setup, lagged=lagged)) for lagged in (False, True)]
         off, chosen = phase_off_delay_deg(setup.sensor.dynamics), needs_lag_states(setup.sensor)
-        figures = " | ".join(f"{then:.4f}, flown on {now:.4f}" for then, now in found[name])
+        figures = " | ".join(f"{then:.4f}, at present {now:.4f}" for then, now in found[name])
         print(f"| {name} | {off:.1f}° | {'states' if chosen else 'delay'} | {figures} |")
     return found
 
@@ -282,7 +284,7 @@ def test_states_are_worth_something_where_a_delay_cannot_follow_and_nothing_wher
     ratio = {name: np.divide(delayed, lagged) for name, (delayed, lagged) in worth.items()}
     assert ratio["2 Hz, damping 0.7"] == pytest.approx([1.0, 1.0], abs=0.03)
     assert ratio["2 Hz, damping 1.5"][0] == pytest.approx(1.0, abs=0.03)  # at the horizon
-    assert ratio["2 Hz, damping 1.5"][1] > 1.2  # flown on
+    assert ratio["2 Hz, damping 1.5"][1] > 1.2  # at present
     assert min(ratio["0.5 Hz, damping 0.7"]) > 1.1
 
 

@@ -1,4 +1,4 @@
-"""A flow sensor whose gain is not 1: the noise is of what it reports, and the filter is told what that is worth."""
+"""A flow sensor whose gain is not 1: the noise is that of its reports, and the filter is given its equivalent."""
 
 from __future__ import annotations
 
@@ -47,13 +47,13 @@ def sensor_of(gain: float) -> FlowSensor:
 
 
 def simulated(gain: float) -> FlowParameters:
-    """What the simulator makes of that file; fast flow is not cut off."""
+    """The simulator's parameters from that file; fast flow is not cut off."""
     made = Chosen(sonar_overscale=False).parameters(sensor_of(gain))
     return made._replace(max_flow_rad_s=100.0, max_height_m=100.0)
 
 
 def told(gain: float, *, by_file: bool) -> FlowSettings:
-    """What the navigator makes of it."""
+    """The navigator's settings from it."""
     settings, noise = settings_of(sensor_of(gain), flow_noise_stated=by_file)
     return settings.settings(FITTED, noise if by_file else NO_STATED_NOISE).flow
 
@@ -160,7 +160,9 @@ def test_each_axis_has_the_noise_of_its_own_gain(angular):
 
 @pytest.mark.parametrize("gain", [0.5, 1.0, 2.0])
 def test_innovations_are_as_large_as_the_filter_says_whatever_the_gain(gain):
-    """Laps of 2 m/s at 2 m, all else exact; how noisy the flow is is not followed, which would mend what is told."""
+    """Laps of 2 m/s at 2 m, all else exact; how noisy the flow is is not followed, which would correct the stated
+    noise.
+    """
     sensor, flown = sensor_of(gain), fly(circle, 40.0)
     flow = flown.streams[Sensor.FLOW_RATE]
     height_m = -flown.at(flow.t_s, flown.position)[:, 2:]

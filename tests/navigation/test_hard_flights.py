@@ -103,7 +103,9 @@ def lying(axis: int, over_s: float, offset_m_s2: float = 3.0) -> Navigated:
 
 @pytest.mark.parametrize("axis", [0, 1])
 def test_an_accelerometer_that_comes_to_read_3_too_much_does_not_carry_the_position_off(axis):
-    """Within a second: 0.3 m; half a kilometre where its noise is held at what is said. Few readings are refused."""
+    """Within a second: 0.3 m; half a kilometre where its noise is held at the stated value. Few readings are
+    refused.
+    """
     flown = lying(axis, 1.0)
     assert np.abs(flown.error[:, :2]).max() < 0.35
     assert np.abs(flown.velocity_error[flown.t_s > 20.0]).max() < 0.2

@@ -122,7 +122,7 @@ def test_a_velocity_errs_by_what_a_receivers_lag_leaves_over_and_that_is_not_lea
     assert add_lag.law(Noise(0.04), StartMemory(0.0), PUSHED, s=s).variance == 0.04
 
     def followed(place: int) -> float:
-        """The factor after 40 s in which a noise of 0.2 m/s is what it is said to be."""
+        """The factor after 40 s in which a noise of 0.2 m/s has its stated size."""
         m, rng = NoiseMemory(), np.random.default_rng(1)
         for i, nu in enumerate(0.2 * rng.standard_normal(200)):
             total = 0.04 * m.factor + (lagging if place > OF_GPS + 2 else 0.0)
@@ -229,7 +229,9 @@ def test_verdicts_on_flow(change, view, reason):
     seen = reading(0.2, -0.3, 0.0, 0.0, 0.0, 0.0, **change)
     s = told(flow_min_height_m=0.3).flow
     assert judge_look.law(seen, RUNS, KEPT, view, angular=True, s=s) == view._replace(reason=reason)
-    waiting = NO_HEADING if reason == FUSED else reason  # that the heading is sought is said of what may be fused
+    waiting = (
+        NO_HEADING if reason == FUSED else reason
+    )  # a sought heading is reported only of readings that may be fused
     assert judge_look.law(seen, RUNS, SEARCHED, view, angular=True, s=s).reason == waiting
 
 

@@ -103,7 +103,7 @@ def spoil(reading: np.ndarray, sensor: np.ndarray, t_s: np.ndarray, at: dict[str
     reading[(sensor == Sensor.RANGE) & (t_s > 7.0), 0, 8] = 2.0
     aids = gps | np.isin(sensor, [Sensor.FLOW_RATE, Sensor.PAD])
     reading[aids & (t_s > 6.0) & (t_s < 10.0), at["arrived"], 9] = 0.0
-    reading[:, at["arrived"], 10] = 0.0  # of this one nothing is ever heard
+    reading[:, at["arrived"], 10] = 0.0  # of this one nothing ever arrives
     reading[(sensor == Sensor.LANDED) & (t_s > 12.0), 0, 11] = 1.0
     reading[np.flatnonzero((sensor == Sensor.IMU) & (t_s > 5.0))[::97], 0, 12] += 30.0
     reading[(sensor == Sensor.BARO) | gps, at["arrived"], 13] = 0.0

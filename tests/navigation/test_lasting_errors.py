@@ -1,4 +1,4 @@
-"""What a lasting error may teach: headings of a compass that is turned aside, and a flow scale without a reference."""
+"""The effect of lasting errors: headings of a compass that is turned aside, and a flow scale without a reference."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sensors away from the IMU, and motion between its readings: told, they do no harm; untold or reversed, they do."""
+"""Sensors away from the IMU, and motion between its readings: stated, they do no harm; missing or reversed, they do."""
 
 from __future__ import annotations
 
@@ -98,4 +98,4 @@ def test_between_readings_the_imu_is_taken_to_change_evenly():
     flown = flown.changed(Sensor.IMU, **imu)
     sampled, integrating = navigate(flown), navigate(flown, imu_integrates=1.0)
     assert np.abs(sampled.velocity_error[-1]).max() < 0.02
-    assert integrating.velocity_error[-1, 0] == pytest.approx(0.1, abs=0.03)  # told of another unit than it is
+    assert integrating.velocity_error[-1, 0] == pytest.approx(0.1, abs=0.03)  # stated in another unit than it is

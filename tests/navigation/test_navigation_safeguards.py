@@ -1,4 +1,4 @@
-"""What the navigator refuses, counts and says: one run for each safeguard."""
+"""The navigator's refusals, counts and warnings: one run for each safeguard."""
 
 from __future__ import annotations
 

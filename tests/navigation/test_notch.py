@@ -37,7 +37,7 @@ def shaken(t_s: np.ndarray, faster: float = 0.0) -> np.ndarray:
 
 
 def passed(force: np.ndarray, s: ImuSettings, start: ToneMemory | None = None) -> tuple[np.ndarray, ToneMemory]:
-    """What is left of readings (n, 3) at PERIOD_S, and the memory after the last."""
+    """Readings (n, 3) at PERIOD_S less their tones, and the memory after the last."""
     m, left = start or ToneMemory(), [(0.0, 0.0, 0.0)]
     for x, y, z in force:
         m = heard_tones((x, y, z), left[-1], m, PERIOD_S, s)
@@ -108,7 +108,7 @@ def rms_velocity(flown: Flown, after_s: float, **keys: Any) -> float:
 
 
 def shaken_flight(every: int = 1, times: float = 1.0) -> Flown:
-    """Laps in a vehicle that shakes so many times as much; of its inertial readings (100 Hz) every such one arrives."""
+    """Laps in a vehicle that shakes `times` times as much; of its inertial readings (100 Hz) every such one arrives."""
     flown = fly(circle, 20.0)
     imu = flown.streams[Sensor.IMU]
     value, kept = imu.value.copy(), slice(None, None, every)

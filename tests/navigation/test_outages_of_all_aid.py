@@ -79,7 +79,7 @@ def test_without_gps_and_flow_an_attitude_holds_the_tilt_and_its_own_error_is_kn
         with_it.append(np.hypot(*held.error[-1, :2]))
         without.append(np.hypot(*alone.error[-1, :2]))
         assert with_it[-1] < 3.0 * np.hypot(*held.said.std_pos_ned_m[-1, :2])
-    assert np.mean(with_it) < 0.75 * np.mean(without)  # whose tilt and bias were told apart before the outage
+    assert np.mean(with_it) < 0.75 * np.mean(without)  # whose tilt and bias were separated before the outage
 
 
 def test_while_something_aids_the_filter_an_attitude_moves_nothing_but_its_own_error():

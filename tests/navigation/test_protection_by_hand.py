@@ -98,7 +98,7 @@ def put_effect(work, fault, north=0.0, east=0.0, down=0.0):
 
 
 def put_size(work, fault, size, sigma):
-    """What innovations told, so that with the prior a fault has this size and standard deviation."""
+    """Set the sums over innovations so that with the prior a fault has this size and standard deviation."""
     total = 1.0 / sigma**2
     work[INFORMATION + fault] = total - 1.0 / prior_sigma(fault) ** 2
     work[SCORE + fault] = total * size
@@ -106,7 +106,7 @@ def put_size(work, fault, size, sigma):
 
 # -- effects and what innovations tell ---------------------------------------------------------------------------
 def test_what_the_filter_has_learnt_is_no_fault(work):
-    """However much of it corrections have told: another one may begin at any time."""
+    """However much corrections have learnt of it: another one may begin at any time."""
     held = [at(ACCEL_BIAS + axis, STATES + FORCE + axis) for axis in range(3)]
     held += [at(GYRO_BIAS + axis, STATES + TURNING + axis) for axis in range(2)]
     work[held[0]] = 0.3

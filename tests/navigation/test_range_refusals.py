@@ -1,4 +1,4 @@
-"""What follows from a range that is refused, as a function of plain records: the accelerometer doubted, or nothing."""
+"""The consequence of a range that is refused, as a function of plain records: the accelerometer doubted, or nothing."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ RANGE = Reading(2.0, *[NAN] * 8, 255.0, 1.0, 0.0)
 
 
 def refusal(crept_sigmas=2.0, sigmas=6.0, refused_s=NAN, told_s=0.0, reason=INNOVATION_GATE, stray=0.0, doubted=0.0):
-    """What follows from a range whose innovation is so many standard deviations of 0.1 m, at 1 s."""
+    """The consequence of a range whose innovation is this number of standard deviations of 0.1 m, at 1 s."""
     return judge_refusal.law(
         verdicts.Tested(reason, 0.1 * sigmas, 0.01, 0.005), RANGE, verdicts.Height(-2.0, 0.1, 1.0),
         AidMemory(height_s=1.0 - told_s),

@@ -1,4 +1,4 @@
-"""From datasheets to what the navigator is told."""
+"""From datasheets to the navigator's settings."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ def test_a_burst_of_noise_does_not_make_itself_usual_and_motors_that_start_do():
 
 
 def test_in_a_vehicle_that_shakes_what_the_next_reading_says_again_is_believed():
-    """Its bursts cannot be told from what it does; three spikes in a row are the most."""
+    """Its bursts cannot be distinguished from its motion; three spikes in a row are the most."""
     shaken = CALM._replace(gyro_rad_s=0.5, accel_m_s2=4.0)
     assert judged([reading(accel=(90.0, 0.0, -9.8))] * 2, 0.01, shaken)[0] == [True, False]
     to_and_fro = [reading(accel=(sign * 120.0, 0.0, -9.8)) for sign in (1.0, -1.0, 1.0, -1.0, 1.0)]

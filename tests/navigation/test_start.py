@@ -102,7 +102,7 @@ def test_roll_and_pitch_are_those_of_the_mean_force_as_far_as_it_is_believed(bel
 
 @pytest.mark.parametrize(("field_rad", "declination_rad", "fitted", "heading"), [
     (0.7, 0.0, FITTED, 0.0),  # no compass is fitted
-    (NAN, 0.2, COMPASS, 0.0),  # none was heard
+    (NAN, 0.2, COMPASS, 0.0),  # none was received
     (0.7, 0.0, COMPASS, -0.7),  # the field lies right of the nose, so the nose left of north
     (0.7, 0.2, COMPASS, -0.5),  # and north is left of the needle
     (-0.7, -0.2, COMPASS, 0.5),

@@ -1,4 +1,4 @@
-"""Standing: what a window of readings must show before a vehicle is said to stand, and what that teaches."""
+"""Standing: the evidence of a window of readings that a vehicle stands, and the corrections that follow."""
 
 from __future__ import annotations
 
@@ -176,7 +176,7 @@ def test_a_quiet_imu_is_not_believed_against_a_height_or_a_speed(seen):
     assert judge_standing(QUIET, seen, NAN) == MOVES
 
 
-# -- where no range is heard ---------------------------------------------------------------------------------------
+# -- where no range is received ------------------------------------------------------------------------------------
 @pytest.mark.parametrize(("gyro", "last_m", "does"), [
     (QUIET, NAN, RESTS),
     (QUIET, 0.2, RESTS),  # the ground was there

@@ -149,7 +149,7 @@ def test_level_it_is_as_noisy_as_along_the_worse_axis_and_down_by_itself():
 
 # -- a sensor's own noise ------------------------------------------------------------------------------------
 def follow(innovations, noise: float, smallest: float = SMALLEST_NOISE, hz: float = 10.0) -> float:
-    """The mean factor of a component whose noise is said to be so, after 100 s."""
+    """The mean factor of a component of stated noise, after 100 s."""
     m, seen = NoiseMemory(1.0, 0.0, -math.inf), []
     for k, innovation in enumerate(innovations):
         m = followed_noise(innovation, 2.0 * noise * m.factor, noise * m.factor, smallest, 5.0, k / hz, m)
@@ -232,7 +232,9 @@ def test_a_flow_innovation_that_lasts_is_not_its_noise():
 
 
 def settled(times: float, drift: float = 0.0, spikes: float = 0.0) -> float:
-    """The mean excess of a flow whose noise is so many times its model of 0.01, and of which so many are spikes."""
+    """The mean excess of a flow whose noise is `times` times its model of 0.01, and of which a share `spikes` are
+    spikes.
+    """
     random, m, before, seen = np.random.default_rng(6), FLOW._replace(taken_s=0.0, excess=1.0), 0.0, []
     for k in range(12000):
         t_s = 0.05 * (k + 1)

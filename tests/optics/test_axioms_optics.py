@@ -1,4 +1,4 @@
-"""What scale, quarter-turns and the way back demand of cameras and of poses that are found in their images."""
+"""Invariances of cameras and of poses found in their images: scale, quarter-turns and the way back."""
 
 from __future__ import annotations
 

@@ -135,7 +135,7 @@ def test_stripes_moved_by_more_than_half_their_pitch_are_seen_to_move_back(shift
     pitch = 4
     x = np.arange(64)
     frames = [np.tile(100.0 + 60.0 * np.cos(2.0 * np.pi * (x - s) / pitch), (64, 1)) for s in (0, shift)]
-    # a small search window leaves one candidate: the pattern's own period cannot be told
+    # a small search window leaves one candidate: the pattern's own period cannot be distinguished
     narrow = CLEAN._replace(search_px=2 if shift < 3 else 1)
     flow = flow_between(*(np.round(f).astype(np.uint8) for f in frames), narrow)
     expected = shift if 2 * shift < pitch else shift - pitch

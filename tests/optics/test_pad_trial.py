@@ -201,7 +201,7 @@ def test_the_command_measures_prints_and_writes_a_datasheet(tmp_path: Path) -> N
 
 @pytest.mark.slow
 def test_the_outer_tag_is_seen_as_the_inner_one_is_at_a_fifth_of_the_height() -> None:
-    """What the datasheet takes for granted of a nested tag: angles, and distances as parts of themselves."""
+    """The datasheet's assumption on a nested tag: angles, and distances as parts of themselves."""
     shares, errors = [], []
     for target, height_m in ((PadTarget(0.2), 1.6), (PadTarget(1.0, "nested"), 8.0)):
         frames = []

@@ -36,7 +36,7 @@ FIGURES |= {f"{name}-{what}" for name in ("takeoff", "landing")
 
 
 class Outcome(NamedTuple):
-    """What the command left behind."""
+    """The result of the command."""
 
     facts: dict[str, Any]
     page: Path
@@ -61,7 +61,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
 
 @pytest.fixture
 def short(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
-    """Quick runs, so many a height, beside one other configuration; with other instruments as quick."""
+    """Quick runs, a given number at each height, beside one other configuration; with other instruments as quick."""
     instrumented = laboratory.otherwise_instrumented
 
     def quick(of: tuple[Configuration, ...], **other: int) -> tuple[Configuration, ...]:

@@ -1,4 +1,4 @@
-"""Parts of somebody else's fly on the compiled loop as ours do: axioms, and every mistake told in one line."""
+"""Parts of somebody else's fly on the compiled loop as ours do: axioms, and every mistake reported in one line."""
 
 from __future__ import annotations
 
@@ -293,8 +293,11 @@ class ThreeAngles(PdController):
         ({"sensors": [Perfect, Perfect]}, r"sensors: one of a kind can be replaced"),
         ({"vehicle": Shrinks}, r"vehicle Shrinks: derivative\(\) gave shape \(13,\)"),
         ({"controller": ThreeAngles}, r"controller pd: command\(\) gave \(0.0, 0.0, 0.0\); four finite angles"),
-        ({"filter": SaysNothing}, r"filter silent: never said anything, and is flown on from 5 s on"),
-        ({"filter": SpeaksLate}, r"filter late: spoke first at 5\.\d+ s, and is flown on from 5 s on"),
+        ({"filter": SaysNothing}, r"filter silent: never gave an estimate, and the autopilot uses it from 5 s on"),
+        (
+            {"filter": SpeaksLate},
+            r"filter late: gave its first estimate at 5\.\d+ s, and the autopilot uses it from 5 s on",
+        ),
         ({"filter": NoNumber}, r"complementary: update\(\) gave an innovation of nan with variance 1.0"),
         ({"filter": NoGround}, r"complementary: estimate\(\).ground_d_m is \[nan\]"),
         ({"filter": NeedsMore}, r"needy: cannot be made: TypeError: .*gain"),

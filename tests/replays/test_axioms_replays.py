@@ -1,4 +1,4 @@
-"""What time, north and silence demand of a whole replay: one made flight of 20 s, later, turned, and cut short."""
+"""Invariances of a whole replay: one made flight of 20 s, later, turned, and cut short."""
 
 from __future__ import annotations
 

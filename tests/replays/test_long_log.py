@@ -23,7 +23,7 @@ MOST_BYTES, MOST_CPU_S = 1.5e9, 20.0
 
 
 def replayed(log: Path) -> tuple[dict, float, float]:
-    """What `replay --json` prints of a log, its most memory [bytes] and its processor time [s]."""
+    """The output of `replay --json` on a log, its peak memory [bytes] and its processor time [s]."""
     command = [sys.executable, "-m", "flownav", "replay", str(log), "--json", "--out", str(log.with_suffix(".fnr"))]
     with log.with_suffix(".json").open("w+") as out, subprocess.Popen(command, stdout=out) as child:
         _, status, used = os.wait4(child.pid, 0)

@@ -55,7 +55,7 @@ def test_components_keep_the_readers_count_of_the_same_reason():
 
 
 def test_a_vertical_velocity_that_gps_does_not_tell_is_no_rejection():
-    """GPS_RAW_INT has none: its NaN is nothing told. One in a component that must be there is a broken reading."""
+    """GPS_RAW_INT has none: its NaN means not stated. One in a component that must be there is a broken reading."""
     velocity, position = Sensor.GPS_VELOCITY, Sensor.GPS_POSITION
     rows = offers(
         (1.0, velocity, 0, Reason.FUSED), (1.0, velocity, 1, Reason.FUSED), (1.0, velocity, 2, Reason.NOT_FINITE),

@@ -100,7 +100,7 @@ def test_a_replayed_ulog_takes_our_estimate_and_theirs_at_their_times(ulog, tmp_
 
 
 def test_without_gps_it_is_turned_with_its_attitude_and_shifted(flown):
-    """What it says of velocity over ground turns with the path; its body velocity stays."""
+    """Its velocity over ground turns with the path; its body velocity stays."""
     t_s, turn = np.arange(1.0, 19.0, 0.1), 1.2
     position, velocity = path_of(flown, t_s)
     c, s = np.cos(turn), np.sin(turn)

@@ -32,7 +32,7 @@ def test_a_sensor_file_sets_the_age_of_flow_and_leaves_its_values(flight_log):
 
 
 def test_gains_of_the_settings_are_taken_off_the_flow(flight_log):
-    """Flow with a gain error, told: the path is that without."""
+    """Flow with a stated gain error: the path is that without."""
     flow = flight_log.streams[Sensor.FLOW_RATE]
     turning, value = flow.value[:, 2:4], flow.value.copy()
     value[:, :2] = turning + (value[:, :2] - turning) * [0.8, 1.25]
@@ -92,7 +92,7 @@ def test_a_file_that_does_not_know_the_axes_is_refused(verdict):
     ("not mirrored (heading unknown)", ((1, 0), (0, 1))),
 ])  # fmt: skip
 def test_a_sensor_whose_axes_are_known_is_put_right(verdict, axes):
-    """What such a sensor says of a motion, put right, is the motion: velocities, and rates with their own gyro."""
+    """The corrected readings of such a sensor show the motion: velocities, and rates with their own gyro."""
     found = identified_flow(sensor_with(axes=verdict))
     assert found.axes == axes
     t_s, body = np.arange(50) * 0.1, np.random.default_rng(1).normal(size=(50, 2))

@@ -1,4 +1,4 @@
-"""What a replay says of a log whose flow, heading, clock or climb is wrong, and that it says nothing of a good one."""
+"""A replay's warnings on a log whose flow, heading, clock or climb is wrong, and none on a good one."""
 
 from __future__ import annotations
 

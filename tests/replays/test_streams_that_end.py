@@ -1,4 +1,4 @@
-"""Half of a sensor's file missing, at its end, its start or in the middle, is said by `info` and by `replay`."""
+"""Half of a sensor's file missing, at its end, its start or in the middle, is reported by `info` and by `replay`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What pages hand to Plotly's script is what Plotly's own Python package would hand it, and is made without that."""
+"""The data that pages pass to Plotly's script are those of Plotly's own Python package, and are made without it."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ from report_records import flight, navigated, replay
 
 
 class Page(HTMLParser):
-    """What a browser would see: text without scripts, scripts, attributes that load something."""
+    """A page as a browser sees it: text without scripts, scripts, attributes that load something."""
 
     def __init__(self, text: str) -> None:
         super().__init__(convert_charrefs=True)
@@ -60,7 +60,7 @@ class Page(HTMLParser):
             self.words.append(data)
 
     def data(self) -> dict:
-        """What the page's script is given, columns apart."""
+        """The data for the page's script, columns apart."""
         return json.loads(next(text for attributes, text in self.scripts if attributes.get("id") == "record-data"))
 
     def figures(self) -> set[str]:

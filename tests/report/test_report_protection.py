@@ -22,7 +22,7 @@ def with_levels(record: Record) -> Record:
 
 
 def lines(panel) -> dict[tuple[str, str], np.ndarray]:
-    """What is drawn, by name and axis."""
+    """The drawn lines, by name and axis."""
     return {(trace.name, trace.yaxis or "y"): np.asarray(trace.y, float) for trace in panel.figure.data if trace.name}
 
 

@@ -1,4 +1,4 @@
-"""What time, north and company demand of scores: a shift, a turn and other flights beside it change none."""
+"""Invariances of scores: a shift, a turn and other flights next to it change none."""
 
 from __future__ import annotations
 

@@ -202,7 +202,7 @@ def test_a_contact_before_landing_is_allowed_is_a_crash_and_no_touchdown():
 
 # -- what limits it ---------------------------------------------------------------------------------------------------
 def test_guidance_estimate_and_pad_add_up_to_the_place():
-    """The pad is last seen at 1 s, when what is flown on is off by (0.3, 0); at contact it is off by (0.3, 0.4)."""
+    """The pad is last seen at 1 s, when the estimate in use is off by (0.3, 0); at contact it is off by (0.3, 0.4)."""
     error = np.zeros((EPOCHS, 2, 1))
     error[:51, 0] = 0.3
     error[51:] = np.array([[0.3], [0.4]])

@@ -1,4 +1,4 @@
-"""What symmetry, scale and time demand of the sensors: quarter-turns, mirrors, the turn of north, steps that add up."""
+"""Invariances of the sensors: quarter-turns, mirrors, the turn of north, steps that add up."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def test_small_turns_and_levers_are_cross_products(seed):
 
 
 def test_a_rotating_force_is_a_quarter_ahead_along_x():
-    """What x feels of a revolution now, y feels a quarter of a turn later: the phase is that of one rotor."""
+    """The force along x of a revolution appears along y a quarter of a turn later: the phase is that of one rotor."""
     p = InertialSheet.read().parameters(152.4, 2)
     unit, quiet = silent(InertialUnit, vibration=1.0), silent(InertialNormals)
     still = ImuReading(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -121,7 +121,7 @@ def test_echoes_are_twice_as_far_or_near() -> None:
     strong = silent(RangeSensorNormals, echo=3.0)
     assert read(down(2.0), strong._replace(echo_kind=1.0)) == (4.0, 255.0, 1.0)
     assert read(down(2.0), strong._replace(echo_kind=-1.0)) == (0.45, 255.0, 1.0)
-    assert read(down(2.6), strong._replace(echo_kind=1.0)) == (5.0, 0.0, 1.0)  # beyond the ceiling: unheard
+    assert read(down(2.6), strong._replace(echo_kind=1.0)) == (5.0, 0.0, 1.0)  # beyond the ceiling: no echo
     assert read(down(9.0), strong._replace(echo_kind=-1.0)) == (0.45, 255.0, 1.0)
     p = sheet_with(echo_share=0.1, held={}).parameters()
     readings = np.array([read(down(2.0), n, p).range_m for n in draws(RangeSensorNormals, 6000, 13)])

@@ -55,7 +55,7 @@ print("\\n" + json.dumps({
 
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory):
-    """What a fresh interpreter found, in which the row was added before the simulator was imported."""
+    """The result of a fresh interpreter in which the row was added before the simulator was imported."""
     script = PROJECT / "docs/how-to/add-a-sensor.py"
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT, str(script)], cwd=tmp_path_factory.mktemp("laser"), capture_output=True,

@@ -1,4 +1,4 @@
-"""What north, scale and nothing at all demand of a flight's surroundings, and what time demands of its timetable."""
+"""Invariances of a flight's surroundings and timetable: north, scale, nothing at all, and time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""An ensemble: what is drawn and from what, that nobody is told, and that a flight is the same whoever asks for it."""
+"""An ensemble: its draws and their distributions, that no part on board knows them, and that a flight is the same
+whoever asks for it.
+"""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ FLIES = hovering(GAINS)._replace(pitch_sine=0.0, roll_sine=0.0)
 
 
 def minded(before=NOTHING, autopilot=FLIES, said=HIGH, known=KNOWS, passed=10):
-    """What an epoch of a vehicle that may learn makes of it."""
+    """One epoch of a vehicle that may learn."""
     return mind.law(before, autopilot, said, HOME, known, gains=GAINS, passed=passed)
 
 

@@ -1,4 +1,4 @@
-"""What the loop does in one lane, as functions of records: what is flown on, noted and remembered."""
+"""The loop in one lane, as functions of records: the state in use, its notes and its memory."""
 
 from math import inf, nan
 
@@ -89,7 +89,7 @@ def test_until_the_hand_over_the_truth_is_flown_and_the_place_noted(waiting, loa
     else:
         assert place == NO_PLACE
         assert flown == SAID
-        assert error == pytest.approx((state.qw, 0.0, 0.0, -state.qz))  # level and north, told of a turned vehicle
+        assert error == pytest.approx((state.qw, 0.0, 0.0, -state.qz))  # level and north are stated of a turned vehicle
     assert hand_to_autopilot.law(state, WAITS, loads, NO_PLACE, SAID, **told)[0] == NO_PLACE
 
 

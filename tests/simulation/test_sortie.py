@@ -27,7 +27,7 @@ def setup():
 
 @pytest.fixture(scope="module")
 def flown(setup):
-    """Touchdowns, tilt errors in hover [rad], heights said and true at rest, of an ensemble."""
+    """Touchdowns, tilt errors in hover [rad], heights stated and true at rest, of an ensemble."""
 
     def judge(history):
         said, true = (history[:, columns(table, QUATERNION)] for table in ("estimate", "truth"))

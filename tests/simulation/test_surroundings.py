@@ -41,7 +41,7 @@ def put(work, lanes, lane, state):
 
 
 def surrounded(flight, truths, states, *, recirculates=False, now=RUNS, epochs=1, thrust_n=0.0):
-    """What surrounds each lane's vehicle: a list of Around."""
+    """The surroundings of each lane's vehicle: a list of Around."""
     work = np.zeros(layout.ROWS * COUNT)
     work[layout.AS_IS_BEGIN * COUNT : layout.AS_IS_END * COUNT] = packed_truth(truths)
     work[layout.THRUST * COUNT : (layout.THRUST + 1) * COUNT] = thrust_n

@@ -1,4 +1,4 @@
-"""A world that the navigator was not told of, flown: slopes, steps and edges, an engine that is cut."""
+"""A world that the navigator does not know, flown: slopes, steps and edges, an engine that is cut."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def test_slow_servos_and_a_stuck_tail_rotor_are_flown_and_a_record_tells_of_them
 
 
 def test_a_motor_that_is_out_turns_a_hexa_over():
-    """No law of ours flies on five: what happens is said as it is."""
+    """No law of ours flies on five: the outcome is reported as it is."""
     _, scores, _ = flown("landing", vehicle="hexa-550", event=[{"at_s": 12.0, "kind": "motor out"}])
     assert (scores["touchdown.broken"] > 0.0).all()
 

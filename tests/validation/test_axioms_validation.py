@@ -1,4 +1,4 @@
-"""What drag, wind, north and time demand of a path that is flown again."""
+"""Invariances of a path that is flown again: drag, wind, north and time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What energy and forces that act at a place demand: drag and friction take, moments are arms times forces."""
+"""Conservation laws of energy and forces that act at a place: drag and friction take, moments are arms times forces."""
 
 from __future__ import annotations
 

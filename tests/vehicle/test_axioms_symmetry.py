@@ -1,4 +1,4 @@
-"""What symmetry demands of either vehicle: mirrors, quarter-turns, the turn of north, what a place of the body sees."""
+"""Symmetries of either vehicle: mirrors, quarter-turns, the turn of north, motion of a place of the body."""
 
 from __future__ import annotations
 

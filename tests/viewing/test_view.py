@@ -103,7 +103,7 @@ def test_the_line_of_a_path_leads_from_pose_to_pose(shown):
 
 
 def test_ned_lies_in_a_right_handed_frame_with_up_upwards(shown):
-    """Rerun's view is told right, forward, up of east, north, up; a metre of north, east, down comes out as that."""
+    """Rerun's view is given right, forward, up of east, north, up; a metre of north, east, down comes out as that."""
     _, read = shown
     right, forward, up = 3, 5, 1  # rerun.components.ViewDir
     assert read.one("/enu", "ViewCoordinates:xyz").tolist() == [[right, forward, up]]

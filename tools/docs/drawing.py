@@ -1,4 +1,4 @@
-"""What every picture of the documentation has: size, colours, how it is kept."""
+"""The common look of the documentation's pictures: size, colours, how they are kept."""
 
 from __future__ import annotations
 

@@ -23,7 +23,9 @@ def typeset(page: str) -> str:
 
 
 def _marked(found: re.Match[str]) -> str:
-    """What arithmatex marked, in the same element, so that a style can let a long equation be scrolled."""
+    """The MathML of a match that arithmatex marked, in the same element, so that a style can let a long equation
+    scroll.
+    """
     return f'<{found[1]} class="arithmatex">{_mathml(found[3], "block" if found[2] == "[" else "inline")}</{found[1]}>'
 
 
@@ -54,5 +56,5 @@ class MathematicsExtension(Extension):
 
 
 def makeExtension(**settings: object) -> MathematicsExtension:
-    """What Python-Markdown calls."""
+    """The extension, for Python-Markdown."""
     return MathematicsExtension(**settings)

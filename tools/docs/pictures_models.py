@@ -27,7 +27,9 @@ def ground_effect() -> Figure:
 
 
 def margins() -> Figure:
-    """Phase margin of every loop of the autopilot: as told, and at the worst corner of the uncertainty box."""
+    """Phase margin of every loop of the autopilot: at the stated parameters, and at the worst corner of the
+    uncertainty box.
+    """
     from flownav.control.margins import LEAST_PHASE_DEG, margins_over_box
 
     rows = margins_over_box(None).rows
@@ -38,7 +40,7 @@ def margins() -> Figure:
     figure, axis = axes(height=0.32 * len(shown) + 1.0)
     for place, i in enumerate(shown):
         axis.plot([least[i], told[i]], [place, place], color="#9ca3af", zorder=1)
-    axis.scatter([told[i] for i in shown], range(len(shown)), label="as told", zorder=2)
+    axis.scatter([told[i] for i in shown], range(len(shown)), label="as stated", zorder=2)
     axis.scatter([least[i] for i in shown], range(len(shown)), label="least over the box", zorder=2)
     axis.axvline(LEAST_PHASE_DEG, color="#6b7280", linestyle=":", label=f"{LEAST_PHASE_DEG:.0f}° asked")
     axis.set_yticks(range(len(shown)), [loops[i] for i in shown])
@@ -49,7 +51,7 @@ def margins() -> Figure:
 
 
 def gps_errors() -> Figure:
-    """What two GPS models read of a vehicle whose place is known: white noise, and a receiver of 2 m CEP."""
+    """The errors of two GPS models at a vehicle whose place is known: white noise, and a receiver of 2 m CEP."""
     figure, axis = axes()
     for model in ("midg", "white"):
         record = flownav.fly("landing", seed=1, filter="paper", gps=model, autopilot="truth")

@@ -44,7 +44,7 @@ def index() -> str:
 
 
 def page(one: Hypothesis) -> str:
-    """What one cause looks like, why, the cure on either autopilot, and how to prevent it."""
+    """The page of one cause: its look, its reason, the cure on either autopilot, and how to prevent it."""
     told = one.words
     text = f"# {told['title']}\n\n`{one.name}`. {measured(one.name)}\n\n"
     text += f"**What it looks like.** {told['looks']}\n\n**Why.** {told['why']}\n\n"

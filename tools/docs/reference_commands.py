@@ -36,7 +36,7 @@ def page() -> str:
 
 
 def _help(name: str) -> str:
-    """What a command prints when it is asked for help."""
+    """The help text of a command."""
     surroundings = {**os.environ, "COLUMNS": COLUMNS, "TERMINAL_WIDTH": COLUMNS, "NO_COLOR": "1"}
     result = CliRunner(env=surroundings).invoke(app, [name, "--help"], prog_name="flownav")
     if result.exit_code:

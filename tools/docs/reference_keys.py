@@ -29,15 +29,15 @@ stands at the end of its key. A number may be written bare, `mass_kg = 8.2`, or 
 a value outside its range. A key without a default must be given.
 """
 FILES: dict[str, tuple[type[BaseModel], str]] = {
-    "Scenario": (Scenario, "What is flown: `flownav fly FILE.toml`. [Scenarios](scenarios.md) tells how they work."),
+    "Scenario": (Scenario, "A flight: `flownav fly FILE.toml`. [Scenarios](scenarios.md) explains how they work."),
     "Requirement": (
         Requirement,
-        "What is certified: `flownav certify FILE.toml`. See [certify](../how-to/certify.md).",
+        "A requirement to certify: `flownav certify FILE.toml`. See [certify](../how-to/certify.md).",
     ),
     "Navigator settings": (
         NavigatorSettingsFile,
-        "What the filter believes of its sensors: `--settings FILE.toml`. "
-        "[The navigator](../explanation/navigator.md) says what each does.",
+        "The filter's models of its sensors: `--settings FILE.toml`. "
+        "[The navigator](../explanation/navigator.md) explains each.",
     ),
     "Flow sensor": (
         FlowSensor,
@@ -57,7 +57,10 @@ FILES: dict[str, tuple[type[BaseModel], str]] = {
         MultirotorFile,
         "A multirotor: `--vehicle FILE.toml`. See [the multirotor](../explanation/multirotor.md).",
     ),
-    "Dispersion": (DispersionFile, "What differs from flight to flight: a scenario's `[dispersion]` names the file."),
+    "Dispersion": (
+        DispersionFile,
+        "The parameters that differ from flight to flight: a scenario's `[dispersion]` names the file.",
+    ),
     "Validation": (ValidationFile, "Which recorded flights the simulator is held against: `flownav validate`."),
 }
 HEADER = "| key | unit | value | range | default | meaning |\n|---|---|---|---|---|---|\n"
@@ -103,7 +106,7 @@ def _shown(default: Any) -> str:
 
 
 def _kind(annotation: Any) -> str:
-    """What a value may be: a number, text, one of some words, a list."""
+    """The values that a field takes: a number, text, one of some words, a list."""
     origin, inner = get_origin(annotation), get_args(annotation)
     if origin is Literal:
         return " or ".join(f"`{value}`" for value in inner)

@@ -22,30 +22,30 @@ quaternion `qw, qx, qy, qz` turns the body's axes into the earth's. `std_` befor
 it, as the filter states it.
 """
 MEANINGS = {
-    "truth": "What the vehicle did: from the simulation, or from motion capture.",
-    "estimate": "What the filter says, with one standard deviation of each figure, and the protection levels: how far "
+    "truth": "The vehicle's true motion: from the simulation, or from motion capture.",
+    "estimate": "The filter's estimate, with one standard deviation of each figure, and the protection levels: how far "
     "off the position may be if a sensor fails and nothing notices.",
     "consistency": "Where the truth is known: NEES, the squared error of position and velocity over the covariance "
     "that the filter states. Its mean is 6 where the filter knows its own errors.",
-    "states": "The rest of what the filter says at the same instants: velocity along the earth's axes, standard "
+    "states": "The rest of the filter's estimate at the same instants: velocity along the earth's axes, standard "
     "deviations of the attitude, and every other state with its own.",
-    "smoothed": "What the filter says once it has seen the whole flight (`replay --smooth`).",
-    "autopilot": "What another estimator said, such as the autopilot's own.",
-    "flown": "What the simulated autopilot flew on: the estimate carried from the horizon to the present, its position "
+    "smoothed": "The estimate smoothed over the whole flight (`replay --smooth`).",
+    "autopilot": "The estimate of another estimator, such as the autopilot's own.",
+    "flown": "The estimate used by the simulated autopilot: carried from the horizon to the present, its position "
     "relative to where the pad is taken to be.",
-    "command": "What the vehicle was told: the reference and the controls.",
-    "setpoint": "What a log says that its autopilot asked for, in the frame of the estimate: position and attitude, "
-    "each where it was asked for.",
+    "command": "The commands to the vehicle: the reference and the controls.",
+    "setpoint": "The set-points of a log's autopilot, in the frame of the estimate: position and attitude, "
+    "each where there is one.",
     "battery": "The battery, as a log has it.",
     "innovation": "One row for each component of a measurement that was offered to the filter: what was observed, how "
     "far it lay from the prediction, whether it was fused, and the reason where it was not.",
     "events": "One row for each happening: its source, its kind, its detail in words, and a value.",
-    "judging": "What scoring must know beside truth and estimate. Of a simulated flight: the ground's height, whether "
+    "judging": "Data for scoring besides truth and estimate. Of a simulated flight: the ground's height, whether "
     "the vehicle goes around, whether the pad can be seen, whether this step counts, and whether the flow sensor sees. "
     "Of a replay: whether a warning stands.",
     "reference": "The external reference of a log (motion capture, a simulator), in the frame in which the log has it.",
     "reference_heading": "The heading of that reference, where the log has it apart.",
-    "fed": "What the navigator was fed, row by row, in its order. `flownav replay` of the record takes these rows.",
+    "fed": "The input of the navigator, row by row, in its order. `flownav replay` of the record takes these rows.",
 }
 STREAMS = """## Measurement streams
 

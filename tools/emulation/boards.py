@@ -28,7 +28,7 @@ INNOVATIONS, EVENTS = onboard.MOST_INNOVATIONS * INNOVATION_COLUMNS, onboard.MOS
 
 
 class LibraryBoard:
-    """What the three have in common: memory that is asked for, written and read, and calls."""
+    """The part that the three boards have in common: memory that is allocated, written and read, and calls."""
 
     def __init__(self, settings: Array, sizes: waiting_records.Sizes) -> None:
         rings = waiting.rows_of(sizes)
@@ -43,7 +43,7 @@ class LibraryBoard:
         self.run("begin", self.work, self.rings, self.settings)
 
     def room(self, numbers: int) -> Any:
-        """A place for so many numbers."""
+        """A place for this number of float64s."""
         raise NotImplementedError
 
     def put(self, at: Any, values: Array) -> None:
@@ -51,7 +51,7 @@ class LibraryBoard:
         raise NotImplementedError
 
     def get(self, at: Any, numbers: int) -> Array:
-        """So many numbers from a place."""
+        """Read this number of float64s from a place."""
         raise NotImplementedError
 
     def call(self, symbol: str, *pointers: Any) -> int:

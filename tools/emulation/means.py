@@ -1,4 +1,4 @@
-"""What it would cost to hand over means of several inertial readings: the state beside that of all readings."""
+"""The cost of passing means of several inertial readings: the state compared with that of all readings."""
 
 from __future__ import annotations
 

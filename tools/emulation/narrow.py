@@ -1,4 +1,4 @@
-"""What 32-bit floats would lose at least: a navigator whose state, covariance or both are rounded after each call."""
+"""The least loss by 32-bit floats: a navigator whose state, covariance or both are rounded after each call."""
 
 from __future__ import annotations
 

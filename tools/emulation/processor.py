@@ -89,7 +89,7 @@ class Processor:
         return count
 
     def room(self, numbers: int) -> int:
-        """The address of memory for so many float64s."""
+        """The address of memory for this number of float64s."""
         at = self._free
         self._free += (8 * numbers + 15) // 16 * 16
         assert self._free < RAM + RAM_BYTES - STACK_BYTES

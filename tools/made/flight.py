@@ -1,4 +1,4 @@
-"""What a made flight is, its seeds, and the CSV folder that it is written as (docs/reference/csv-folder.md)."""
+"""A made flight: its definition, its seeds, and the CSV folder that it is written as (docs/reference/csv-folder.md)."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ GRAVITY_M_S2 = 9.80665
 
 
 class Truth(NamedTuple):
-    """What was so, at every instant of one fixed step.
+    """The true motion at every instant of one fixed step.
 
     t_s (n,); pos_ned_m, vel_ned_m_s (n, 3) of the IMU, from where it stood at first; quaternion (n, 4) body FRD to NED,
-    w first. rate_frd_rad_s, force_frd_m_s2 (n - 1, 3): what perfect gyros and accelerometers would show, each the mean
+    w first. rate_frd_rad_s, force_frd_m_s2 (n - 1, 3): the readings of perfect gyros and accelerometers, each the mean
     over the step that follows t_s. take_off_s, landing_s: the first and the last instant at which it flies.
     """
 

@@ -26,7 +26,7 @@ from made.reckoning import reckoned
 NEEDED = (Sensor.IMU, Sensor.FLOW_RATE, Sensor.RANGE)
 HEADINGS = (
     "flight", "flownav: end drift [m]", "most", "heading [deg]", "dead reckoning: end drift [m]", "most",
-    "raw gyro: heading [deg]", "level, median [m]", "beyond it unsaid [% of flight]",
+    "raw gyro: heading [deg]", "level, median [m]", "beyond it without a warning [% of flight]",
 )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""What became of one made flight: flownav by its defaults, beside the line of dead reckoning, against what was so."""
+"""The result of one made flight: flownav by its defaults and the line of dead reckoning, against the truth."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def nis(flown: Replay, sensors: tuple[Sensor, ...], window: tuple[float, float])
 
 
 def errors_of(flown: Replay, truth: Truth) -> Errors:
-    """What is wrong with the estimate in flight; position and heading from take-off on."""
+    """The errors of the estimate in flight; position and heading from take-off on."""
     said = flown.said
     rows = (said.t_s >= truth.take_off_s) & (said.t_s <= truth.landing_s)
     at = np.clip(np.searchsorted(truth.t_s, said.t_s[rows]), 0, len(truth.t_s) - 1)

@@ -105,7 +105,7 @@ def _bands(values: Array, hz: float) -> Array:
 
 
 def _rough(stream: Stream, inner: tuple[float, float]) -> float:
-    """What a straight line between neighbours does not explain, robust: 1.4826 times the median size over root 6."""
+    """The residual of a straight line between neighbours, robust: 1.4826 times the median size over root 6."""
     good = _within(stream.t_s, inner) & (stream.quality > 0)
     values = stream.value[good, : min(2, stream.value.shape[1])]
     bent = values[2:] - 2.0 * values[1:-1] + values[:-2]

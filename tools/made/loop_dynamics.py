@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 STEP_S = 0.001
-EACH = 10  # steps between rows of what it is told
+EACH = 10  # steps between rows of its commands
 GRAVITY_M_S2 = 9.80665
 OFF, IDLE, FLY, LAND, HAND = 0.0, 1.0, 2.0, 3.0, 4.0
 COLUMNS = (
@@ -23,13 +23,13 @@ COLUMNS = (
 
 
 class Vehicle(NamedTuple):
-    """What a vehicle is like. Forces are over its mass, torques over its inertia.
+    """The parameters of a vehicle. Forces are over its mass, torques over its inertia.
 
-    arm_m: from the middle to a rotor along x and y; foot_m: the same to a foot; leg_m (4,): how far below the IMU each
-    foot is. most: thrust of all rotors over weight; lag_s: of a motor; spread (4,): factor of each motor on what it is
-    told. gyration_m2: moment of inertia over mass about x, y; about z twice that. yaw_m: torque over thrust of a rotor.
-    offset_m (2,): of the centre of mass, forward and right, which tips it as it lifts off. drag_per_s. rotor_m: radius.
-    friction: Coulomb's coefficient.
+    arm_m: from the middle to a rotor along x and y; foot_m: the same to a foot; leg_m (4,): how far below the IMU
+    each foot is. most: thrust of all rotors over weight; lag_s: of a motor; spread (4,): factor of each motor on its
+    command. gyration_m2: moment of inertia over mass about x, y; about z twice that. yaw_m: torque over thrust of a
+    rotor. offset_m (2,): of the centre of mass, forward and right, which tips it as it lifts off. drag_per_s.
+    rotor_m: radius. friction: Coulomb's coefficient.
     """
 
     arm_m: float
@@ -47,7 +47,7 @@ class Vehicle(NamedTuple):
 
 
 class Told(NamedTuple):
-    """What the vehicle is told and what happens to it, a row every EACH steps (m, ...).
+    """The commands to the vehicle and the disturbances on it, a row every EACH steps (m, ...).
 
     phase (m,): OFF to HAND. place (m, 3), yaw (m,): where to go, in HAND where the hand holds it, at angle (m, 3),
     roll, pitch and yaw. slip_rad_s (m,): what turns it on the floor. wind_m_s (m, 3). believed (m, 7): errors of the
@@ -134,7 +134,7 @@ def feet(vehicle, boxes, ground_m, p, v, r, rate, feels, twists):
 
 @njit(cache=True)
 def mixed(vehicle, lift, twist, motors):
-    """Thrust over weight that each rotor is told, from lift over weight and angular acceleration [rad/s2]."""
+    """Thrust over weight that each rotor is commanded, from lift over weight and angular acceleration [rad/s2]."""
     inertia = vehicle.gyration_m2 / GRAVITY_M_S2
     roll, pitch = twist[0] * inertia / (4.0 * vehicle.arm_m), twist[1] * inertia / (4.0 * vehicle.arm_m)
     yaw = min(max(twist[2] * 2.0 * inertia / (4.0 * vehicle.yaw_m), -0.06), 0.06)
@@ -174,7 +174,7 @@ def controlled(vehicle, place, yaw, seen_p, seen_v, r, rate, memory, motors):
 
 @njit(cache=True)
 def pushed(vehicle, wind, wash, height, motors, v, r, thrust, feels, twists):
-    """Rotors follow what their motors are told; adds their thrust, more near the ground, and what the air does."""
+    """Lets rotors follow their motors' commands; adds their thrust, more near the ground, and the forces of the air."""
     near = vehicle.rotor_m / (4.0 * (height + 0.03))
     grown = min(1.0 / max(1.0 - near * near, 0.5), 1.2)
     lift, whole = 0.0, 0.0
@@ -200,7 +200,7 @@ def pushed(vehicle, wind, wash, height, motors, v, r, thrust, feels, twists):
 
 @njit(cache=True)
 def held(place, angle, p, v, q, r, rate, feels, twist):
-    """What a hand does: a spring to where it is, and it turns what it holds."""
+    """Adds the action of a hand: a spring to its place, and the turn of the held vehicle."""
     feels += 400.0 * (place - p) - 40.0 * v
     feels[2] -= GRAVITY_M_S2
     cr, sr = np.cos(0.5 * angle[0]), np.sin(0.5 * angle[0])

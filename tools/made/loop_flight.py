@@ -1,4 +1,4 @@
-"""Generator B, the flight: what a vehicle is told to do, the room that it is in, and what came of it."""
+"""Generator B, the flight: the vehicle's commands, the room that it is in, and the resulting flight."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST_PATH_M = 34.0
 
 
 class Flown(NamedTuple):
-    """What the sensors look at: the truth, the thrust of each rotor over weight (n, 4), the room.
+    """The scene of the sensors: the truth, the thrust of each rotor over weight (n, 4), the room.
 
     boxes (k, 5): north from, to, east from, to, down [m], and the floor about them, down; from where the IMU stood.
     """
@@ -81,7 +81,7 @@ def _room(traits: Traits, random: np.random.Generator) -> tuple[Array, float]:
     return np.array([[-half[0], half[0], -half[1], half[1], 0.0]]), between(random, (0.45, 0.8))
 
 
-# -- what it is told ---------------------------------------------------------------------------------------------
+# -- the commands ------------------------------------------------------------------------------------------------
 def _script(traits: Traits, random: np.random.Generator, boxes: Array, ground_m: float) -> tuple[Script, float]:
     """The legs of a flight, and when a hand lets go [s] (0 without)."""
     script, release_s = Script([0.0], [OFF], [np.zeros(3)], [0.0]), 0.0
@@ -223,7 +223,7 @@ def wandering(random: np.random.Generator, count: int, tau_s: float) -> Array:
     return found
 
 
-# -- what came of it ---------------------------------------------------------------------------------------------
+# -- the result --------------------------------------------------------------------------------------------------
 def _cut(traits: Traits, out: Array, boxes: Array, ground_m: float, leg_m: float, release_s: float) -> Flown:
     """The rows from the log's begin on, places from where the IMU was then."""
     out = out[round(SETTLING_S / STEP_S) :]

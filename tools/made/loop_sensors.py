@@ -94,7 +94,9 @@ def imu(traits: Traits, flight: Flown, random: np.random.Generator) -> Table:
 
 
 def _vibration(random: np.random.Generator, thrust: Array) -> Array:
-    """What unbalanced rotors do (n, 6) [rad/s, m/s2]: a force that turns with each, as the square of how fast."""
+    """The vibration of unbalanced rotors (n, 6) [rad/s, m/s2]: a force that turns with each, as the square of its
+    speed.
+    """
     hover_hz = between(random, (85.0, 210.0))
     hz = hover_hz * np.sqrt(np.maximum(thrust, 0.0) / 0.25)
     phase = 2.0 * np.pi * np.cumsum(hz, axis=0) * STEP_S + random.uniform(0.0, 2.0 * np.pi, 4)
@@ -121,7 +123,7 @@ def _gyro_bias(traits: Traits, random: np.random.Generator, count: int) -> Array
 
 
 def _shift(traits: Traits, random: np.random.Generator, shaking: float) -> Array:
-    """What the accelerometer's mean is shifted by at hover [m/s2] (3,)."""
+    """The shift of the accelerometer's mean at hover [m/s2] (3,)."""
     shift = 0.05 * shaking * shaking * random.standard_normal(3)
     if traits.accel_lie_m_s2[1] > 0.0:
         shift += 0.25 * random.standard_normal(3)
@@ -238,7 +240,7 @@ def _means(t_s: Array, values: Array, ends: Array) -> Array:
 
 
 def _patches(random: np.random.Generator, place: Array) -> Array:
-    """What a floor's texture varies by over north and east (n,), of about unit variance."""
+    """The variation of a floor's texture over north and east (n,), of about unit variance."""
     waves = random.normal(0.0, 2.5, (6, 2))
     return np.sqrt(2.0 / 6.0) * np.cos(place @ waves.T + random.uniform(0.0, 2.0 * np.pi, 6)).sum(axis=1)
 

@@ -1,4 +1,4 @@
-"""What went wrong first in a flight, as far as its errors and the record's events tell."""
+"""The first sign of an error in a flight, from its errors and the record's events."""
 
 from __future__ import annotations
 

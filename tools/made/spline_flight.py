@@ -24,7 +24,7 @@ WHOLE = 500  # steps of a flight are a multiple, and one instant more: a length 
 
 
 class Flown(NamedTuple):
-    """What the sensors look at. truth; motors (n,): 0 off, 0.5 idle, 1 in flight; ground_m: height of the floor about
+    """The scene of the sensors. truth; motors (n,): 0 off, 0.5 idle, 1 in flight; ground_m: height of the floor about
     the table that it started on (0 without).
     """
 
@@ -125,7 +125,7 @@ def _boxed(values: Array, width_s: float) -> Array:
 
 
 def _wobble(traits: Traits, random: np.random.Generator, t_s: Array, lift_s: float) -> Array:
-    """What holding a position looks like, and the slide at lift-off: north, east and height [m] (n, 3)."""
+    """The sway of a held position, and the slide at lift-off: north, east and height [m] (n, 3)."""
     size_m = between(random, traits.wobble_m)
     swaying = np.column_stack([band_noise(random, len(t_s), 0.1, 0.7) for _ in range(3)])
     swaying *= size_m * np.array([1.0, 1.0, 0.6]) * _ramp(t_s, lift_s + 0.4, 1.5)[:, None]
@@ -155,7 +155,7 @@ def _grounded(t_s: Array, path: Array, lift_s: float, sink_s: float, ground_m: f
 
 
 def _slip(traits: Traits, random: np.random.Generator, t_s: Array, motors_s: float, lift_s: float) -> Array:
-    """What the motors turn the vehicle by on the floor as they spin up [rad] (n,): a few sticking steps."""
+    """The heading change by the motors on the floor as they spin up [rad] (n,): a few sticking steps."""
     whole = np.deg2rad(between(random, traits.slip_deg)) * random.choice([-1.0, 1.0])
     steps = int(random.integers(1, 4))
     share = random.dirichlet(np.ones(steps))

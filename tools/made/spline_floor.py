@@ -26,7 +26,7 @@ class Floor(NamedTuple):
     rich: Array
 
     def height(self, north: Array, east: Array) -> Array:
-        """What is below a place [m]."""
+        """Height of the surface below a place [m]."""
         found = np.full(north.shape, self.ground_m)
         for low_n, high_n, low_e, high_e, top in self.boxes:
             inside = (north > low_n) & (north < high_n) & (east > low_e) & (east < high_e)

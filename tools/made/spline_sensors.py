@@ -100,7 +100,7 @@ def _gyro_bias(traits: Traits, random: np.random.Generator, count: int) -> Array
 
 
 def _lie(traits: Traits, random: np.random.Generator, motors: Array, shaking: float) -> Array:
-    """What vibration makes of an accelerometer that is not symmetric [m/s2] (n, 3): a shift that grows with it."""
+    """The effect of vibration on an accelerometer that is not symmetric [m/s2] (n, 3): a shift that grows with it."""
     shift = 0.04 * shaking**2 * random.standard_normal(3)
     worst, size = random.choice(3, p=[0.4, 0.4, 0.2]), between(random, traits.accel_lie_m_s2)
     shift += 0.45 * size * random.uniform(-1.0, 1.0, 3)
@@ -154,10 +154,10 @@ def flow(traits: Traits, flown: Flown, floor: Floor, random: np.random.Generator
 
 
 def image_motion(flown: Flown, floor: Floor, rows: Array, lens_m: float, askew: Array) -> tuple[Array, Array]:
-    """What moves through the sensor's middle [rad/s] (n, 2) in its own axes, PX4's convention, and texture (n,).
+    """The motion through the sensor's middle [rad/s] (n, 2) in its own axes, PX4's convention, and texture (n,).
 
     rows (n,): of the truth. askew (3, 3): the sensor's axes in the vehicle's, as columns. Over its aperture it is the
-    mean of what is seen at five points, each at its depth, weighted by their texture.
+    mean of the motion at five points, each at its depth, weighted by their texture.
     """
     truth = flown.truth
     position, quaternion = truth.pos_ned_m[rows], truth.quaternion[rows]

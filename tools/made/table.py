@@ -24,7 +24,7 @@ class Three(NamedTuple):
 
 
 class Row(NamedTuple):
-    """What came of some flights. drift_m: at the end; heading_deg likewise; ours, and those of dead reckoning (line).
+    """The result of some flights. drift_m: at the end; heading_deg likewise; ours, and those of dead reckoning (line).
 
     closer: share of flights in which flownav is at least as close. percent: median of the drift over the path, ours and
     line. nis: means over flights, flow and range. level_m: median. unsaid: share of the flight beyond the level without
@@ -107,7 +107,7 @@ def _mean(values: Array) -> float:
 
 # -- what is asked -------------------------------------------------------------------------------------------------
 def failings(row: Row) -> list[str]:
-    """What a row falls short of, in words: of drift, heading, divergence, NIS."""
+    """The targets that a row misses, in words: of drift, heading, divergence, NIS."""
     found = []
     if not row.ours_m.median <= MEDIAN_RATIO * row.line_m.median:
         found.append("median")
@@ -135,13 +135,13 @@ DRIFT = (
 )  # fmt: skip
 TRUST = (
     "class", "heading, flownav: median [deg]", "95 %", "raw gyro: median", "95 %", "NIS flow", "NIS range",
-    "level, median [m]", "beyond it unsaid [% of flight]", "flights", "warned [% of flight]",
+    "level, median [m]", "beyond it without a warning [% of flight]", "flights", "warned [% of flight]",
     "error over stated: position", "velocity", "heading", "falls short in",
 )  # fmt: skip
 
 
 def markdown(rows: Sequence[Row]) -> str:
-    """Two tables: drift beside dead reckoning, and what is said beside what is so."""
+    """Two tables: drift next to dead reckoning, and stated errors next to true ones."""
     return _table(DRIFT, [_drift(row) for row in rows]) + "\n" + _table(TRUST, [_trust(row) for row in rows])
 
 

@@ -9,7 +9,7 @@ EKF3_AVERAGING_MS = 50.0  # EKF3 takes half of flowTimeDeltaAvg_ms off by itself
 
 
 def good_parameters(dialect: str, log: Log) -> dict[str, float]:
-    """What suits a sound log's sensors; with GPS where the log has some."""
+    """Parameters that suit a sound log's sensors; with GPS where the log has some."""
     outdoors = Sensor.GPS_POSITION in log.streams
     flow_ms = 1e3 * log.streams[Sensor.FLOW_RATE].delay_s
     gps_ms = 1e3 * log.streams[Sensor.GPS_POSITION].delay_s if outdoors else 110.0

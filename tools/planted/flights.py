@@ -132,7 +132,7 @@ def setup_of(kind: str, seed: int) -> Setup:
 
 @lru_cache(maxsize=8)
 def flight(kind: str, seed: int) -> Log:
-    """What the vehicle's sensors read, and the truth beside it, of one flight of an ensemble."""
+    """The readings of the vehicle's sensors, with the truth, of one flight of an ensemble."""
     setup = setup_of(kind, seed)
     log = replace(log_of(fly_recorded(setup, seed, ensemble=setup.ensemble()), setup), origin_deg_m=ORIGIN_DEG_M)
     if kind not in ("hall", "low"):

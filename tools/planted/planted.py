@@ -98,7 +98,7 @@ def logged(fault: Planted, parameters: dict[str, float] | None = None) -> Log:
 
 
 def in_effect(streams: Streams, before: dict[str, float], own: dict[str, float]) -> Streams:
-    """What parameters that differ from those of the fault do to readings before they are logged and fused."""
+    """The readings as logged and fused under parameters that differ from those of the fault."""
     found = dict(streams)
     flow, field = found[Sensor.FLOW_RATE], found[Sensor.MAG]
     turn = 45.0 * (own.get("SENS_FLOW_ROT", 0.0) - before.get("SENS_FLOW_ROT", 0.0))

@@ -1,4 +1,4 @@
-"""What came of planted faults, and the page that says how often an explanation was right."""
+"""The results of planted faults, and the page on how often an explanation was right."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Flown(NamedTuple):
 
 
 class Result(NamedTuple):
-    """One planted fault and what came of it: the causes named, the first one first, and its cure flown again."""
+    """The result of one planted fault: the causes named, the first one first, and its cure flown again."""
 
     fault: Planted
     named: tuple[str, ...]
@@ -105,7 +105,7 @@ def page(
     recorded: list[Recorded],
     judged: str,
 ) -> str:
-    """The tables; again: the same in other flights, of "clean" as well; judged: what is said of recorded logs."""
+    """The tables; again: the same in other flights, of "clean" as well; judged: the text on recorded logs."""
     text = HEAD + "| list | planted | first look | first cause right | all named | also one that was not planted "
     text += "| in other flights right | all named | processor time, most |\n|---|---|---|---|---|---|---|---|---|\n"
     for name, found in by_list.items():
@@ -148,9 +148,8 @@ def page(
     cured = [(one.fault.name, one.flown) for one in single if one.flown is not None]
     harmed = [one for _, one in cured if one.harmed]
     text += "\n## Cures flown again\n\nThe same fault in another flight, with the parameters of the cure, where they "
-    text += (
-        f"are said to cure it: of {len(harmed)} flights in which the fault did harm {sum(one.holds for one in harmed)} "
-    )
+    text += f"are named as its cure: of {len(harmed)} flights in which the fault did harm "
+    text += f"{sum(one.holds for one in harmed)} "
     text += "are as good as without it; of the others, in which the stand-in was not hurt, "
     text += f"{sum(one.holds for _, one in cured if not one.harmed)} of {len(cured) - len(harmed)} stay so. "
     text += "Level velocity and height, rms, in m/s and m.\n\n"

@@ -20,7 +20,7 @@ Streams = dict[Sensor, Stream]
 
 
 class Case(NamedTuple):
-    """What a way to spoil may look at: the sound log, chance, and the window [s]."""
+    """The input of a spoiling function: the sound log, chance, and the window [s]."""
 
     log: Log
     rng: np.random.Generator
@@ -167,7 +167,7 @@ def flow_noisy(streams: Streams, case: Case, noise_rad_s: float) -> None:
 def flow_unfocused(
     streams: Streams, case: Case, below_m: float, noise_rad_s: float, share: float, quality: float
 ) -> None:
-    """Below a height the picture is blurred: a share of the flow and noise, at a quality that is not told apart."""
+    """Below a height the picture is blurred: a share of the flow and noise, at a quality that does not show it."""
     one = streams[Sensor.FLOW_RATE]
     value = one.value.copy()
     value[:, :2] = share * value[:, :2] + noise_rad_s * case.rng.standard_normal((len(one), 2))

@@ -30,7 +30,9 @@ DOWN = np.array([0.0, 0.0, GRAVITY_M_S2])
 
 
 class Sources(NamedTuple):
-    """What is taken, and how: delays [s], the height's source and how slowly it is followed [s], limits of the flow."""
+    """The sources that are used, and how: delays [s], the height's source and how slowly it is followed [s], limits
+    of the flow.
+    """
 
     gps: bool
     flow: bool
@@ -48,7 +50,7 @@ class Sources(NamedTuple):
 
 
 def sources_of(p: dict[str, float], dialect: str, source_set: int) -> Sources:
-    """What the parameters of a dialect say."""
+    """The sources that the parameters of a dialect select."""
     if dialect == "ardupilot":
         velocity, place, height = (p[f"EK3_SRC{source_set}_{what}"] for what in ("VELXY", "POSXY", "POSZ"))
         return Sources(
@@ -162,7 +164,7 @@ class StandIn:
         self.past.append((self.pos, self.vel, np.array(self.attitude.rotation).reshape(3, 3)))
 
     def _then(self, t_s: float) -> tuple[Array, Array, Array]:
-        """What it held then: position, velocity, attitude."""
+        """The state at that time: position, velocity, attitude."""
         return self.past[max(bisect_right(self.times, t_s) - 1, 0)]
 
     def _since(self, name: str, t_s: float) -> float:
@@ -214,7 +216,9 @@ class StandIn:
         self.vel = self.vel + FLOW_GAIN * (rotation[:, :2] @ body) * np.array([1.0, 1.0, 0.0])
 
     def _baro(self, t_s: float, down_m: float) -> None:
-        """The barometer holds the height as it was told, or once GPS, that should, is gone: from where that left it."""
+        """Fuse the barometer where it is the height's source, or once GPS, that should be, is gone: from where that
+        left it.
+        """
         if self.sources.height == "baro":
             self._height(t_s, "baro", down_m, 0.03)
         elif self.sources.height == "gps" and t_s - self.seen_s.get("gps", t_s) > GONE_S:
@@ -246,7 +250,9 @@ class StandIn:
 
 
 class Estimated(NamedTuple):
-    """What the stand-in said: columns as record.TABLES["autopilot"], its attitude, and whether it took the flow."""
+    """The estimates of the stand-in: columns as record.TABLES["autopilot"], its attitude, and whether it took the
+    flow.
+    """
 
     table: Table
     attitude: Stream

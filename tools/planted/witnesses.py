@@ -1,4 +1,4 @@
-"""What other sensors of two recorded logs say of the causes that are named of them, which nobody had judged before."""
+"""The evidence of other sensors of two recorded logs on the named causes, which nobody had judged before."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the navigator promises, case by case, and whether it keeps it (docs/explanation/accuracy.md)."""
+"""The accuracy that the navigator promises case by case, and whether it keeps it (docs/explanation/accuracy.md)."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from flownav.vehicle.parameters import MultirotorParameters
 
 CASES = SHIPPED  # requirements by name, with what is flown and what the ensemble must keep
 PAPERS_CONDITIONS = ("takeoff", "landing")
-LEAST_INSIDE = 0.93  # of the steps in flight, where the truth is as the filter has been told
+LEAST_INSIDE = 0.93  # of the steps in flight, where the truth is as the filter's models state
 LEAST_INSIDE_OF_ENSEMBLE = 0.90
 LARGEST_AXIS_M = 0.10  # 95th percentile of the matched flights in the paper's conditions
 SHARE = 0.95
@@ -102,7 +102,9 @@ def scenario_of(name: str, vehicle: str | None = None) -> Scenario:
 
 
 def inside(flights: int) -> str:
-    """What the ANEES of so many flights is held against: that of each GROUP_FLIGHTS, of all where there are fewer."""
+    """The name of the consistency target of this number of flights: the ANEES of each GROUP_FLIGHTS, of all where there
+    are fewer.
+    """
     group = min(flights, consistency.GROUP_FLIGHTS)
     return f"steps with the ANEES of {group} flights in its {100 * consistency.BAND_PROBABILITY:.0f} % band"
 
@@ -168,7 +170,7 @@ def _facts(judged: Judged, bound: consistency.ErrorSums) -> dict[str, Any]:
 
 
 def _matched_targets(name: str, facts: dict[str, Any], flights: int) -> tuple[Target, ...]:
-    """The promises of a case whose truth is as the filter has been told."""
+    """The promises of a case whose truth is as the filter's models state."""
     worst = float(np.max(list(facts["rmse_over_bound"].values())))
     within = Target("matched", inside(flights), facts["anees_inside_fraction"], LEAST_INSIDE, at_least=True)
     if name in PAPERS_CONDITIONS:
@@ -186,9 +188,9 @@ def _matched_targets(name: str, facts: dict[str, Any], flights: int) -> tuple[Ta
 
 
 def _ensemble_targets(asked: Requirement, judged: Judged, facts: dict[str, Any]) -> tuple[Target, ...]:
-    """The promises of a case whose truth nobody told the filter: its requirement, and its consistency.
+    """The promises of a case whose truth the filter does not know: its requirement, and its consistency.
 
-    Here a requirement is held against the figure of the flights themselves; `flownav certify` says what they show.
+    Here a requirement is held against the figure of the flights themselves; `flownav certify` judges what they show.
     """
     rows, flights = np.column_stack([judged.scores, judged.largest_horizontal_m]), len(judged.scores)
     found, crashes = [], []
@@ -206,7 +208,7 @@ def _ensemble_targets(asked: Requirement, judged: Judged, facts: dict[str, Any])
 
 
 def _cost(judged: Judged, whole: Judged) -> dict[str, Any]:
-    """A variant's figures, and the errors of what it flew on over those of the whole navigator."""
+    """A variant's figures, and the errors of the estimate in use over those of the whole navigator."""
     squares, wholes = judged.flown.root_mean_square() ** 2, whole.flown.root_mean_square() ** 2
     assert judged.sums is not None
     landings = touchdown_rows(judged.scores)

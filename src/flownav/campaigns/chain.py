@@ -1,10 +1,10 @@
-"""Rows of a campaign that tell when they were altered: each has a digest of itself and of all rows before it.
+"""Rows of a campaign that show any alteration: each has a digest of itself and of all rows before it.
 
 A row's digest is SHA-256 over the digest before it, the names of the columns and the row's own bytes: flight, inputs,
-scores, what became of it. The first row of a cell follows that of the plan. So a file says whether it is as it was
-written, from its pages' checksums to the order of its rows, and the last digest of a cell stands for all of its
-flights. It is no signature: who has this code can make digests of other numbers. What the flights are is told by flying
-them again (`certification.again`), and who says so by a key (`certification.verify`).
+scores, outcome. The first row of a cell follows that of the plan. So a file shows whether it is as it was written, from
+its pages' checksums to the order of its rows, and the last digest of a cell stands for all of its flights. It is no
+signature: anyone with this code can make digests of other numbers. Flying the flights again proves their content
+(`certification.again`), and a key proves the author (`certification.verify`).
 """
 
 from __future__ import annotations
@@ -41,7 +41,9 @@ class Part(NamedTuple):
 
 
 def root_of(plan: Mapping[str, Any], cell: int) -> bytes:
-    """What the first row of a cell follows: the digest of the campaign's plan, as its folder says it, and the cell."""
+    """The digest that the first row of a cell follows: of the campaign's plan, as written in its folder, and the cell's
+    number.
+    """
     told = {name: value for name, value in plan.items() if name not in OF_NO_FLIGHT}
     return hashlib.sha256(f"{json.dumps(told, sort_keys=True)}\n{cell}".encode()).digest()
 
@@ -117,7 +119,7 @@ def _read_checked(path: Path) -> Any:
 
 
 def _bytes_of(path: Path) -> bytes:
-    """A file's bytes. ValueError where it says of itself what cannot be; pyarrow ends the process at some of that."""
+    """A file's bytes. ValueError where its header states impossible sizes; pyarrow ends the process at some of them."""
     with an_input(path).open("rb") as file:
         data = file.read(MOST_PART_BYTES + 1)
     if len(data) > MOST_PART_BYTES:

@@ -2,7 +2,7 @@
 
 A truth of its own costs Python more than a millisecond; a device that flies a thousand times as fast would wait.
 
-Flights are flown so many at once; their scores come back and nothing else. Of an ensemble the truths are drawn on the
+A fixed number of flights is flown at once; only their scores come back. Of an ensemble the truths are drawn on the
 CPU, as everywhere, while the device flies the flights before.
 """
 
@@ -34,7 +34,9 @@ from flownav.simulation.ensemble import Ensemble, believed
 from flownav.simulation.plan import Flight
 from flownav.simulation.truth import TRUTH_ROWS, SensorFault, packed_truth
 
-Truths = Callable[[int, int], Array]  # of so many flights from a number on: (TRUTH_ROWS, flights); of one, for all
+Truths = Callable[
+    [int, int], Array
+]  # called with the first flight's number and the number of flights: (TRUTH_ROWS, flights); of one, for all
 
 SLICE_FLIGHTS = 512  # flights that a process draws at a time
 WORTH_IT = 4096  # flights: fewer are drawn before other processes have started
@@ -43,7 +45,7 @@ WORTH_IT = 4096  # flights: fewer are drawn before other processes have started
 def truths_of(
     flight: Flight, seed: int, ensemble: Ensemble | None, faults: Callable[[int], SensorFault] | None = None
 ) -> Truths:
-    """Truths for `simulation.engine.fly_into`: what the sheets say or the ensemble draws, and each flight's fault."""
+    """Truths for `simulation.engine.fly_into`: the sheets' values or the ensemble's draws, and each flight's fault."""
 
     def packed(first: int, count: int) -> Array:
         if ensemble is not None:
@@ -59,7 +61,7 @@ def truths_of(
 
 @contextmanager
 def truths_of_cell(cell: Ready, seed: int, flights: int, processes: int) -> Iterator[Truths]:
-    """The truths of a cell of which so many flights will be asked for."""
+    """The truths of a cell of which `flights` flights will be requested."""
     if cell.ensemble is None or cell.failure is not None or processes < 2 or flights < WORTH_IT:
         yield truths_of(cell.flight, seed, cell.ensemble, cell.faults(seed))
         return
@@ -118,7 +120,9 @@ class Cuda:
                 yield from into_parts(together, rows, on_progress)
 
     def rows(self, flight: Flight, seed: int, first: int, flights: int, truths: Truths) -> Iterator[Array]:
-        """The rows of so many flights from number `first` on, (flights, RUNNING_COLUMNS), as many as fit at a time."""
+        """Yield the rows of `flights` flights from number `first` on, (flights, RUNNING_COLUMNS), as many as fit at a
+        time.
+        """
         at_once = min(self._at_once, flights, most_that_fit(self._runner.free_bytes(), flight))
         if at_once < 1:
             raise InputError(
@@ -149,7 +153,7 @@ def most_that_fit(free_bytes: int, flight: Flight) -> int:
 
 
 class Room:
-    """A device's memory for flights of one kind, so many at once."""
+    """A device's memory for `at_once` flights of one kind."""
 
     def __init__(self, runner: Runner, flight: Flight, at_once: int) -> None:
         self._runner, self._flight = runner, flight

@@ -75,7 +75,7 @@ def fly_navigated_flight(
 ) -> None:  # fmt: skip
     """Flight `first + thread` on the navigator, which writes no tape.
 
-    fresh: a navigator that has heard nothing (`navigation.memory.new_work`); nav: such rows for whole warps. nothing,
+    fresh: a new navigator (`navigation.memory.new_work`); nav: such rows for whole warps. nothing,
     room, used (flights * TAPE_COUNTS,): a tape without room, which only counts. take: how the flight calls the
     navigator; on a device the marker of its build, see `take_here`.
     """
@@ -110,7 +110,7 @@ def note_epoch(
     work: Work, lanes: Lanes, epoch: int, reference: Reference, flight: Flight, onboard: Onboard | None,
     into: tuple[int, int],
 ) -> None:  # fmt: skip
-    """What this epoch shows, into the scores of this flight. into: their first row; the epoch of `home`."""
+    """Add this epoch to the scores of this flight. into: their first row; the epoch of `home`."""
     row, home = into
     state, says = load_helicopter(work, ONE_LANE, 0), load_estimated(work, ONE_LANE, 0)
     ground_m = ground_height(state.pos_n, state.pos_e, ground_as_is(work, ONE_LANE, 0))

@@ -26,7 +26,7 @@ from flownav.simulation.plan import Flight
 
 
 class Part(NamedTuple):
-    """Some flights of a cell: so many from number `first` on; number: of the file that they go to."""
+    """Flights of a cell: `flights` of them from number `first` on; number: of the file that they go to."""
 
     number: int
     first: int
@@ -117,7 +117,7 @@ class Local:
 def into_parts(
     parts: Sequence[Part], blocks: Iterable[Array], on_progress: Callable[[int], object]
 ) -> Iterator[tuple[Part, Array]]:
-    """The rows of each part, from blocks of rows in order, told as they come."""
+    """Yield the rows of each part, from blocks of rows in order; progress is reported as they come."""
     waiting, held, have = list(parts), list[Array](), 0
     for block in blocks:
         held.append(block)
@@ -147,7 +147,7 @@ PARTS_AHEAD = 2  # parts that wait for each core of the cluster
 
 
 class RayCluster:
-    """address: of the cluster; None: as RAY_ADDRESS says, else a new one on this machine. InputError without Ray."""
+    """address: of the cluster; None: RAY_ADDRESS, else a new one on this machine. InputError without Ray."""
 
     piece = 4 * len(LANES)  # a task
 
@@ -201,7 +201,9 @@ _cells: dict[str, Ready] = {}  # of a worker: the last cell that it has flown
 
 
 def fly_part(told: list[Any], key: str, seed: int, part: Part) -> Array:
-    """A part's rows, flown by a worker on one thread. told: where what `plan.ready_of` makes a cell of is to be had."""
+    """A part's rows, flown by a worker on one thread. told: the reference to the arguments from which `plan.ready_of`
+    makes a cell.
+    """
     if key not in _cells:
         import ray
 

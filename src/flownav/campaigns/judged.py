@@ -1,14 +1,14 @@
-"""Flights judged: what they flew on for accuracy, the navigator at its horizon for consistency, its bound, and the same
-flights without one piece of what it knows or hears.
+"""Scores flights: the estimate used by the autopilot for accuracy, the navigator at its horizon for consistency, its
+bound, and the same flights without one piece of its knowledge or one sensor.
 
-What is flown on is the estimate of now, counted from where the vehicle takes its pad to be. The navigator's own stands
-at its horizon, some 0.1 s ago and in its own frame, which GPS has put somewhere: there it states its covariance, and
-only there the two can be held against each other.
+The autopilot uses the estimate of now, relative to the believed place of the pad. The navigator's own estimate stands
+at its horizon, some 0.1 s ago and in its own frame, whose origin GPS has set: there it states its covariance, and only
+there errors and covariance can be compared.
 
-What each piece is worth is what it costs to fly without it: the autopilot flies on the poorer estimate. A piece of
-knowledge goes by telling the navigator something else, a sensor by not carrying it; the code that flies is the same.
-There is no variant without "ground-effect knowledge", since the navigator has none to lose: the IMU measures the force
-that the ground adds. There is none without an IMU, either: nothing else tells the attitude.
+The worth of each piece is the loss without it: the autopilot uses the poorer estimate. A piece of knowledge is removed
+by giving the navigator another setting, a sensor by not carrying it; the code that flies is the same. There is no
+variant without "ground-effect knowledge", since the navigator has none to lose: the IMU measures the force that the
+ground adds. There is none without an IMU, either: nothing else gives the attitude.
 """
 
 import math
@@ -44,13 +44,14 @@ BOUND_FLIGHTS = 64  # the covariance hardly differs from flight to flight
 
 @dataclass(frozen=True)
 class Judged:
-    """What a batch of flights leaves: a row of scores and a largest horizontal error a flight, and sums.
+    """The result of a batch of flights: a row of scores and a largest horizontal error for each flight, and sums.
 
     scores (flights, len(SCORE_COLUMNS)); largest_horizontal_m (flights,), in flight and relative to where the vehicle
-    takes its pad to be; flown: errors in flight of what was flown on; sums: of the navigator at its horizon; groups:
-    those of each GROUP_FLIGHTS flights one after the other (of all where there are fewer; a remainder is left out).
-    These two are None for a filter that states no consistency. takeoffs: (flights, len(TAKEOFF_COLUMNS)), None of
-    flights that start in the air. attitude_deg: (flights, 3, len(STATISTICS)), of what they flew on.
+    takes its pad to be; flown: errors in flight of the estimate used by the autopilot; sums: of the navigator at its
+    horizon; groups: those of each GROUP_FLIGHTS flights one after the other (of all where there are fewer; a remainder
+    is left out). These two are None for a filter that states no consistency. takeoffs: (flights, len(TAKEOFF_COLUMNS)),
+    None of flights that start in the air. attitude_deg: (flights, 3, len(STATISTICS)), of the estimate used by the
+    autopilot.
     """
 
     scores: Array
@@ -162,7 +163,7 @@ def bound_of(setup: Setup, seed: int, flights: int, *, threads: int | None = Non
 
 
 def consistency_facts(judged: Judged, bound: Bound) -> dict[str, Any]:
-    """What `flownav fly` says of many flights of the navigator; null where no flight flew."""
+    """Consistency figures of many flights of the navigator for `flownav fly`; null where no flight flew."""
     assert judged.groups is not None
     assert judged.sums is not None
     inside = consistency.within_band(judged.groups, judged.sums).as_stated
@@ -205,7 +206,7 @@ def ablations(setup: Setup) -> dict[str, Flight]:
 
 
 def _with(setup: Setup, **changed: Any) -> Flight:
-    """The flight with a navigator that is told, or a vehicle that carries, something else."""
+    """The flight with other settings of the navigator, or another equipment of the vehicle."""
     assert setup.fitted is not None
     other = refitted(setup.fitted, setup.flight.plan.epochs, **changed)
     return setup.flight._replace(onboard=other.onboard, table=other.schedule, settings=other.settings)
@@ -218,7 +219,9 @@ def _without(setup: Setup, sensor: str) -> Flight:
 
 
 def ageless(carried: Fitted) -> Timing:
-    """A flow sensor that is said to show the velocity of now: no lag of its own, no latency; its jitter stays."""
+    """Timing of a flow sensor that is stated to show the velocity of now: no lag of its own, no latency; its jitter
+    stays.
+    """
     return Timing(0.0, 0.0, carried.timing[Sensor.FLOW_RATE].jitter_s)
 
 

@@ -69,7 +69,7 @@ def _touchdown_of_lane(flight: Flight, history: Array) -> Array:
 
 
 def pad_to_be_seen(flight: Flight, t_s: Array, cg_height_m: Array) -> Array:
-    """Where the vehicle can still see its pad, or is still told where it is, (epochs, lanes) 0/1.
+    """Where the vehicle can still see its pad, or is still given its place, (epochs, lanes) 0/1.
 
     With a pad camera down to its least height; without one until the hand-over, and of the paper's filter until it last
     notes its home.
@@ -108,8 +108,8 @@ def home_epoch(flight: Flight) -> int | None:
 def counted_steps(flight: Flight, history: Array) -> Array:
     """The steps whose errors are scored, (epochs, lanes) 0/1: of the paper's filter all, as the paper has it.
 
-    Of the navigator those in flight after the hand-over: until then the vehicle is flown on the truth, or stands on its
-    skids, and what it flies on has no error by definition; on the ground again, nothing is flown on it.
+    Of the navigator those in flight after the hand-over: until then the autopilot uses the truth, or the vehicle stands
+    on its skids, and the estimate in use has no error by definition; on the ground again, it is not used.
     """
     contact = history[:, column("truth", "contact_n")]
     if flight.onboard is None:
@@ -143,13 +143,13 @@ def fly_many(
 
 
 def known_exactly(scenario: Scenario) -> str:
-    """What the vehicle of a scenario is given that a real one would have to find out."""
+    """The exact knowledge that a scenario's vehicle is given and a real one would have to find out, in words."""
     if scenario.flight.start == "ground":
-        return f"where it stands until take-off at {scenario.flight.takeoff_at_s:g} s"
+        return f"its position on the ground until take-off at {scenario.flight.takeoff_at_s:g} s"
     held_s = float(scenario.filter.handover_s)
     if scenario.autopilot.home == "start":
-        return f"where it hovers for its first {held_s:g} s, flown on the truth"
-    return f"nothing, but it is flown on the truth for its first {held_s:g} s"
+        return f"its position in hover for the first {held_s:g} s (true state used)"
+    return f"nothing (true state used for the first {held_s:g} s)"
 
 
 def fly_recorded(
@@ -189,7 +189,7 @@ def record_flown(setup: Setup, flown: Flown, seed: int, index: int, drawn: dict[
 
 
 def judging_table(flight: Flight, history: Array) -> dict[str, Array]:
-    """What scoring must know of a flight beside truth and estimate, as `record.TABLES` says; history of one lane."""
+    """The table that scoring needs next to truth and estimate, as `record.TABLES` defines it; history of one lane."""
     t_s: Array = np.arange(len(history), dtype=np.float64) * EPOCH_S
     height_m = -history[:, column("truth", "pos_d_m")]
     return {
@@ -230,9 +230,9 @@ def rows_of(flight: Flight, history: Array) -> Array:
 
 
 def largest_horizontal_m(flight: Flight, history: Array) -> Array:
-    """The largest horizontal error in flight of what each flight was flown on [m], (lanes,).
+    """The largest horizontal error in flight of the estimate that each flight's autopilot used [m], (lanes,).
 
-    It is relative to where the vehicle takes its pad to be, and counted from there on.
+    It is relative to the believed place of the pad, and counted from there on.
     """
     home, epoch = home_epoch(flight), np.arange(len(history))[:, None]
     aloft = (history[:, column("truth", "contact_n")] <= 0.0) & (epoch >= (home or 0))
@@ -243,7 +243,7 @@ def largest_horizontal_m(flight: Flight, history: Array) -> Array:
 
 # -- over the wind -----------------------------------------------------------------------------------------------
 def directions_deg(count: int) -> list[float]:
-    """Directions, so many, even over the circle, from north on."""
+    """`count` directions, even over the circle, from north on [deg]."""
     return [360.0 * k / count for k in range(count)]
 
 

@@ -1,4 +1,4 @@
-"""What is measured of a flight, by the names that requirements, events and stops use; figures of many flights.
+"""The measures of a flight, by the names that requirements, events and stops use; figures of many flights.
 
 A touchdown that did not happen is infinitely bad: of a flight that crashed, never touched or never came to rest a
 measure of its touchdown is infinite, as R95 has it.
@@ -25,7 +25,7 @@ from flownav.scoring.percentiles import percentile_with_interval, share_with_int
 CRASH, NOT_LANDED = "crash", "not_landed"
 LARGEST_HORIZONTAL = "largest_horizontal_m"
 EVENT = re.compile(r"\s*([\w.]+)\s*(?:(>|<)\s*(\S+))?\s*")
-# a row of a campaign: the scores, and what a flight's history told beside them
+# a row of a campaign: the scores, and the largest error taken from a flight's history
 ROW_COLUMNS = (*SCORE_COLUMNS, LARGEST_HORIZONTAL)
 
 
@@ -40,7 +40,7 @@ class Measure(NamedTuple):
 
     @property
     def of_landing(self) -> bool:
-        """Whether it says something only of flights that were to land."""
+        """Whether it applies only to flights that were to land."""
         return self.of_touchdown or self.name == NOT_LANDED
 
 
@@ -61,9 +61,9 @@ _MEASURES = (
             "touchdown.limited_by.guidance_m"),
     Measure("touchdown.pad_m", "m", "how wrong the pad's place was when it was last seen",
             "touchdown.limited_by.pad_m"),
-    Measure("estimate.axis_m", "m", "largest error of one axis of the estimate that is flown on",
+    Measure("estimate.axis_m", "m", "largest error of one axis of the estimate used by the autopilot",
             "max_position_error_m", of_touchdown=False),
-    Measure("estimate.horizontal_m", "m", "largest horizontal error of the estimate that is flown on",
+    Measure("estimate.horizontal_m", "m", "largest horizontal error of the estimate used by the autopilot",
             LARGEST_HORIZONTAL, of_touchdown=False),
     Measure(CRASH, "", "1 where the flight crashed, else 0", "touchdown.broken", of_touchdown=False),
     Measure(NOT_LANDED, "", "1 where the flight was to land and did not, else 0", "touchdown.broken",
@@ -192,7 +192,7 @@ def figure_of(name: str, values: Array, confidence: float = CONFIDENCE) -> Inter
 
 
 def values_of(name: str, rows: Array) -> Array:
-    """What a figure is taken from, (flights,); rows (flights, len(ROW_COLUMNS))."""
+    """The values from which a figure is taken, (flights,); rows (flights, len(ROW_COLUMNS))."""
     return measured(FIGURES[name].measure, rows)
 
 

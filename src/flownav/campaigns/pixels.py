@@ -3,8 +3,8 @@
 The kernel flies whole flights and cannot stop for a frame. But a flight is the same bytes whenever it is flown, and
 what is seen in a frame moves nothing before the navigator takes that reading. So the flight is flown up to a frame, the
 frame is rendered from where the vehicle then is, the detector's fix goes into a table that the kernel reads in place of
-the pad camera's model, and the flight is flown again from its start, a frame or two farther. In the end it has been
-flown on what its detector saw, exactly. Every other sensor is the model's.
+the pad camera's model, and the flight is flown again from its start, a frame or two farther. In the end its navigator
+has used exactly the fixes of its detector. Every other sensor is the model's.
 """
 
 from collections.abc import Callable
@@ -35,9 +35,9 @@ from flownav.simulation.onboard import EPOCH_S, PAD_SEEN
 from flownav.simulation.truth import PUNCTUAL
 
 LOWEST_LENS_M = 0.11  # below that a lens all but touches the pad: no frame is rendered
-ABOVE_RANGE = 1.5  # nor from higher than so many times the datasheet's greatest height
+ABOVE_RANGE = 1.5  # nor from higher than this multiple of the datasheet's greatest height
 FARTHEST_RAD = 1.3  # from the axis
-LOOK_AHEAD = 25  # frames that are flown on while there is nothing to render
+LOOK_AHEAD = 25  # frames ahead that the flight goes on while there is nothing to render
 MOTION = (*POSITION_NED, *VELOCITY_BODY, *QUATERNION, *TABLES["truth"][10:13])
 
 
@@ -72,7 +72,7 @@ def fly_on_pixels(
     setup: Setup, seed: int, index: int = 0, ensemble: Ensemble | None = None,
     on_progress: Callable[[float], None] = lambda t_s: None,
 ) -> tuple[Setup, list[PixelFrame]]:  # fmt: skip
-    """The setup whose flight `index` is flown on what was seen in its frames, and those frames.
+    """The setup whose flight `index` uses the fixes found in its rendered frames, and those frames.
 
     InputError where the flight has no pad camera, or one that `flownav pad` did not measure.
     """
@@ -126,7 +126,7 @@ def target_of(sheet: PadCameraSheet) -> PadTarget:
 
 
 def mounting_rad(sheet: PadCameraSheet, flown: pad_trial.CameraFlight) -> float:
-    """What is left of the datasheet's boresight when the calibration's share, which the frames have, is taken off."""
+    """The datasheet's boresight less the calibration's share, which the frames have."""
     calibration = pad_trial.camera_named(sheet.camera).calibration.centre_px / flown.optic.lens.focal_px
     return float(np.sqrt(max(np.radians(sheet.boresight_deg) ** 2 - calibration**2, 0.0)))
 
@@ -209,10 +209,10 @@ BANDS_M = (0.0, 0.3, 0.6, 1.2, 2.4, 4.8, 100.0)
 
 
 def agreement(frames: list[PixelFrame], sheet: PadCameraSheet) -> list[dict[str, Any]]:
-    """By height: what was found and how far off in the frames, beside what the datasheet says of the same frames.
+    """By height: the detections and their errors in the frames, next to the datasheet's values for the same frames.
 
     expected_found: by its chances, of the frames with the whole pad in view; *_rms: of errors with their bias, and
-    expected_*: noise and bias of the datasheet at the same heights and rates. None where there is nothing to tell.
+    expected_*: noise and bias of the datasheet at the same heights and rates. None where there is no frame.
     """
     p = sheet.parameters()
     rows = []

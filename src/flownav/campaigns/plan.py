@@ -1,4 +1,5 @@
-"""What a campaign flies: cells, each a scenario with its values of what is swept, and how their flights are drawn.
+"""The plan of a campaign: cells, each a scenario with its values of the swept parameters, and how their flights are
+drawn.
 
 A design gives the uniforms of an input, a number in (0, 1) for each flight, as a function of (seed, flight, name) and
 of how many flights the campaign has. Hypercubes and sequences are of `LOT_FLIGHTS` flights each, one after the other,
@@ -84,11 +85,11 @@ Sweep = Mapping[str, Sequence[Value]]
 
 
 class Failure(Protocol):
-    """What fails in every flight of a cell."""
+    """The failure in every flight of a cell."""
 
     @property
     def words(self) -> str:
-        """What, from when to when."""
+        """The failure, from when to when, in words."""
 
     def law(self, flight: Flight, seed: int, number: int) -> SensorFault:
         """One flight's fault, by its number."""
@@ -96,9 +97,9 @@ class Failure(Protocol):
 
 @dataclass(frozen=True)
 class Ready:
-    """A cell made ready to fly, of a campaign of so many flights.
+    """A cell made ready to fly, of a campaign of `flights` flights.
 
-    ensemble: what differs from flight to flight; None where nothing does. failure: what fails; None: nothing.
+    ensemble: the parameters that differ from flight to flight; None where none does. failure: None without one.
     """
 
     setup: Setup
@@ -110,7 +111,7 @@ class Ready:
 
     @property
     def flight(self) -> Flight:
-        """What the kernel flies."""
+        """The flight as the kernel flies it, with the cell's failure."""
         return self.setup.flight if self.failure is None else self.setup.flight._replace(fails=True)
 
     def faults(self, seed: int) -> Callable[[int], SensorFault] | None:
@@ -166,7 +167,7 @@ class Plan:
 
     @cached_property
     def as_json(self) -> dict[str, Any]:
-        """The campaign as its folder says it; two campaigns of the same are the same flights."""
+        """The campaign as written in its folder; two campaigns of the same are the same flights."""
         return {
             "schema_version": SCHEMA_VERSION,
             "flownav": __version__,

@@ -28,7 +28,7 @@ CLASSES = ("build", "day", "never")
 CONFIDENCE = 0.90
 RESAMPLES = 1000
 MOST_KURTOSIS = 10.0  # beyond it the ranks are ranked: few outcomes far off carry the variance
-LEAST_ROWS, MOST_ROWS = 16, 65_536  # rows: fewer say nothing
+LEAST_ROWS, MOST_ROWS = 16, 65_536  # rows: fewer show nothing
 Fly = Callable[[Design, int, int], Array]
 
 
@@ -97,7 +97,7 @@ def rank(entries: Mapping[str, Distribution], seed: int, n: int, fly: Fly) -> Ra
 
 
 def flights_of(inputs: int, n: int) -> int:
-    """How many flights `rank` flies for so many dispersed inputs."""
+    """The number of flights that `rank` flies for `inputs` dispersed inputs."""
     return n * (2 + inputs + 1 + len(CLASSES))
 
 

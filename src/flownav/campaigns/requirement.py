@@ -147,7 +147,7 @@ class Requirement(ParameterModel):
     description: str = ""  # one sentence, shown in the certificate
     scenario: str  # a shipped scenario's name, or a file beside this one
     vehicle: str | None = None  # a shipped name, or a file beside this one; none: the scenario's
-    seed: int = Field(USUAL_SEED, ge=0, lt=2**63)  # of all random draws; another than 1 is said to be chosen
+    seed: int = Field(USUAL_SEED, ge=0, lt=2**63)  # of all random draws; another than 1 is reported as chosen
     set: dict[str, Any] = Field(default_factory=dict)
     conditions: Conditions = Field(default_factory=Conditions)
     requirement: tuple[RequirementTable, ...] = Field(min_length=1, max_length=20)
@@ -158,7 +158,9 @@ class Requirement(ParameterModel):
 
 
 def needed_by(table: RequirementTable, failures: int | None = None) -> int:
-    """How many flights a requirement needs, with so many failures (else with those that it allows). InputError."""
+    """The number of flights a requirement needs with this number of failures (else with those that it allows).
+    InputError.
+    """
     from flownav.campaigns.tolerance import needed
 
     try:
@@ -203,7 +205,7 @@ def load_requirement(name: str) -> Requirement:
 
 
 def fixed_by(requirement: Requirement) -> dict[str, Any]:
-    """What a requirement sets and no flight draws, by dotted name: all of its `set` that has no range."""
+    """The values that a requirement fixes, by dotted name: all of its `set` that has no range."""
     return {name: value for name, value in leaves(requirement.set, "") if name not in requirement.conditions.ranges}
 
 

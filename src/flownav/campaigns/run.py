@@ -88,7 +88,7 @@ class Counted:
         self._tell()
 
     def estimate(self, values: Array) -> None:
-        """What is followed, from the flights of the cell so far."""
+        """Update the figure that is followed, from the flights of the cell so far."""
         self._interval = figure_of(self._figure, values)
         self._tell()
 
@@ -181,7 +181,7 @@ def _flown(
 
 
 def _pieces(parts: list[Part], have: int, most: int) -> Iterator[Part]:
-    """Parts cut into pieces of at most so many flights, without the first `have` flights of the first part."""
+    """Yield parts cut into pieces of at most `most` flights, without the first `have` flights of the first part."""
     for part in parts:
         for start in range(have, part.flights, most):
             yield Part(part.number, part.first + start, min(most, part.flights - start))
@@ -189,9 +189,10 @@ def _pieces(parts: list[Part], have: int, most: int) -> Iterator[Part]:
 
 
 def _begun(store: Store, cell: int, part: Part, before: bytes, done: Counted) -> Array:
-    """What was saved of a part that follows this digest, (flights, len(ROW_COLUMNS)); of no flight where nothing was.
+    """The saved rows of a part that follows this digest, (flights, len(ROW_COLUMNS)); of no flight where none were
+    saved.
 
-    What is damaged is told of and flown again.
+    A damaged file is reported and its flights are flown again.
     """
     try:
         kept = store.begun(cell, part.number)
@@ -205,7 +206,7 @@ def _begun(store: Store, cell: int, part: Part, before: bytes, done: Counted) ->
 def _found(store: Store, cell: int, part: Part, before: bytes | None, done: Counted) -> Kept | None:
     """A part that the folder has as it was written; None where it has none. before: the digest that it must follow.
 
-    One that is damaged is told of, once.
+    A damaged one is reported, once.
     """
     try:
         kept = store.kept(cell, part.number, part.flights)
@@ -293,4 +294,4 @@ def give_back_early() -> None:
                 (M_ARENA_MAX, 1),
             ):
                 mallopt(parameter, value)
-    os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")  # heard when Arrow is loaded
+    os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")  # read when Arrow is loaded

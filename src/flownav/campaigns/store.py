@@ -114,7 +114,7 @@ class Store:
         return part_path(self.folder, cell, part)
 
     def kept(self, cell: int, part: int, flights: int) -> Kept | None:
-        """A part's rows, where it has so many flights; None where it is not there, or has fewer.
+        """A part's rows, where it has `flights` flights; None where it is not there, or has fewer.
 
         DamagedError where it is not as it was written.
         """
@@ -130,7 +130,7 @@ class Store:
         return Kept(rows_of_table(found.table), found.before, found.last)
 
     def require_no_more(self, cell: int, parts: int) -> None:
-        """InputError where a cell's folder has flights that are not the plan's, which has so many parts."""
+        """InputError where a cell's folder has flights that are not the plan's, which has `parts` parts."""
         known = [part_path(self.folder, cell, number) for number in range(parts)]
         strange = next((path for path in Dataset(self.folder).parts(cell) if path not in known), None)
         if strange is not None:
@@ -146,7 +146,9 @@ class Store:
         return part_path(self.folder, cell, part, "begun")
 
     def begun(self, cell: int, part: int) -> Kept | None:
-        """What was saved of a part that is not there. DamagedError where that is not as it was written."""
+        """The saved rows of a part that is not complete; None without any. DamagedError where the file is not as it was
+        written.
+        """
         path = self.begun_path(cell, part)
         if not path.exists():
             return None
@@ -228,7 +230,7 @@ def _is_more_of(known: dict[str, Any], asked: dict[str, Any], differs: list[str]
 
 
 def plan_in(folder: Path) -> dict[str, Any]:
-    """What a folder says of its campaign. InputError where it says nothing that can be read."""
+    """The plan in a campaign's folder. InputError where it cannot be read."""
     return object_in(folder / PLAN, "give a campaign's folder, or another name")
 
 
@@ -244,7 +246,7 @@ SWEPT = "set."  # before the name of what the campaign sweeps
 
 
 def limited_by(row: Array) -> str:
-    """What limited a flight: what broke it, or the largest part of how far off it touched."""
+    """The reason that limited a flight: its failures, or the largest part of its touchdown error."""
     landing = touchdown_rows(row[None, : len(SCORE_COLUMNS)])[0]
     if broken := names_of(landing[BROKEN]):
         return ", ".join(broken)

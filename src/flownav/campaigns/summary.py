@@ -1,4 +1,4 @@
-"""What a campaign found: figures of every cell with their intervals, what became of its flights, views, the worst."""
+"""The summary of a campaign: figures of every cell with their intervals, outcomes of its flights, views, the worst."""
 
 from collections import Counter
 from collections.abc import Mapping

@@ -1,7 +1,7 @@
-"""What so many flights with so many failures show: plans, binomial intervals, tolerance bounds, verdicts.
+"""Statistics of n flights with f failures: plans, binomial intervals, tolerance bounds, verdicts.
 
 A requirement is that at least a share `probability` of all flights succeed. n flights with f failures show it with
-confidence `confidence` when so few failures were unlikely were it not so:
+confidence `confidence` when f failures or fewer would be unlikely if it did not hold:
 
     P(at most f failures in n flights | a flight fails with 1 - probability) <= 1 - confidence.
 
@@ -33,7 +33,7 @@ class Interval(NamedTuple):
 
 
 def needed(probability: float, confidence: float, failures: int = 0) -> int:
-    """The fewest flights that show a requirement when so many of them fail. ValueError where 10^9 do not.
+    """The fewest flights that show a requirement when `failures` of them fail. ValueError where 10^9 do not.
 
     probability and confidence in (0, 1), as everywhere here.
     """
@@ -49,12 +49,12 @@ def needed(probability: float, confidence: float, failures: int = 0) -> int:
 
 
 def shown(flights: int, failures: int, probability: float, confidence: float) -> bool:
-    """Whether so many flights with so many failures show the requirement."""
+    """Whether `flights` flights with `failures` failures show the requirement."""
     return flights > failures and risk(flights, failures, probability) <= 1.0 - confidence
 
 
 def risk(flights: int, failures: int, probability: float) -> float:
-    """The consumer's risk: how likely at most so many failures are when the share is only just not met.
+    """The consumer's risk: the probability of at most `failures` failures when the share is only just not met.
 
     0 for a negative number of failures: such a plan never passes.
     """
@@ -64,7 +64,7 @@ def risk(flights: int, failures: int, probability: float) -> float:
 
 
 def allowed(flights: int, probability: float, confidence: float) -> int:
-    """The most failures with which so many flights still show the requirement; -1 where they are too few for any."""
+    """The most failures with which `flights` flights still show the requirement; -1 where they are too few for any."""
     low, high = -1, flights  # `low` passes, `high` does not
     while high - low > 1:
         middle = (low + high) // 2
@@ -89,7 +89,7 @@ def verdict(flights: int, failures: int, probability: float, confidence: float) 
 
 
 def _refuted(flights: int, failures: int, probability: float, confidence: float) -> bool:
-    """Whether at least so many failures were unlikely if the requirement were met."""
+    """Whether at least `failures` failures would be unlikely if the requirement were met."""
     from scipy.special import bdtrc
 
     return failures > 0 and float(bdtrc(failures - 1.0, flights, 1.0 - probability)) < 1.0 - confidence

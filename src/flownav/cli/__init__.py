@@ -38,7 +38,7 @@ COMMANDS = {  # by name, as the help lists them
     "sitl": "Fly a real autopilot's simulator on flownav; faults; scored.",
     "sample": "Write small simulated logs, to try the other commands on.",
     "recover": "Make the record of a live session that was killed.",
-    "info": "What a log holds: sensors, rates, gaps, signs, what it lacks.",
+    "info": "Content of a log: sensors, rates, gaps, signs, missing sensors.",
     "explain": "Why a log drifted: the first cause, its evidence, what cures it.",
     "identify": "Identify a flow sensor from rig or flight logs; write its file.",
     "rig": "Swing a flow sensor over a pad beside an encoder, from pixels.",
@@ -144,7 +144,7 @@ def option_of(argument: str) -> str:
 
 
 def _leave_usage(error: typer.TyperException) -> None:
-    """What was typed cannot be: one line, and where to read what can."""
+    """Leave with one line on a usage error, and the command that shows the usage."""
     context = getattr(error, "ctx", None)
     command = context.command_path if context is not None else "flownav"
     message = error.format_message().replace("\n", " ").strip()

@@ -77,7 +77,7 @@ def _targets(made: list[Case]) -> str:
 
 
 def _known(made: list[Case]) -> str:
-    return _table(("case", "what the vehicle knows exactly"), [(case.name, case.known) for case in made])
+    return _table(("case", "known to the vehicle without error"), [(case.name, case.known) for case in made])
 
 
 def _consistency(made: list[Case], truth_model: str) -> str:
@@ -127,7 +127,7 @@ def _touchdowns(made: list[Case], truth_model: str) -> str:
 
 
 def _over_stated(made: list[Case]) -> str:
-    """Which state's error is larger or smaller than the navigator says."""
+    """The table of states whose error is larger or smaller than the navigator states."""
     rows = [
         (case.name, model, *_ratios(getattr(case, model)["error_over_stated"]))
         for case in made for model in TRUTH_MODELS
@@ -136,7 +136,7 @@ def _over_stated(made: list[Case]) -> str:
 
 
 def _could_be(made: list[Case]) -> str:
-    """What the band asks of a filter: how large its covariance is stated, and when."""
+    """The shares of steps in the consistency band: as stated, and with the covariance scaled once or at each step."""
     shares = ("anees_inside_fraction", "anees_inside_fraction_sized", "anees_inside_fraction_sized_at_each_step")
     rows = [
         (case.name, model, f"{facts['anees']:.2f}", *(figure(facts[share], ".2f") for share in shares))

@@ -1,4 +1,6 @@
-"""`flownav build` and `verify`: the navigator as a library for other processors, and what it says there compared."""
+"""`flownav build` and `verify`: the navigator as a library for other processors, and its output there compared with
+replay.
+"""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,7 +18,7 @@ WITHOUT = "Leave parts out: less code."
 HORIZON = "How far behind the newest reading an instant is when it is fused [s]."
 IMU, OTHERS = "Inertial readings a second that there is room for.", "Readings of other sensors a second."
 CPU, FEATURES = "With a triple: the CPU, as LLVM calls it.", "With a triple: its features, as LLVM has them."
-WHAT = "What a board says: 16 digits, a file of lines (readings, digits), or a folder of `flownav build`."
+WHAT = "A board's answer: 16 digits, a file of lines (readings, digits), or a folder of `flownav build`."
 FLIGHTS = "those of the flight"
 FLOWN = "the scenario pad_return, flown here"
 
@@ -56,13 +58,13 @@ def command(
 
 
 def _show(place: Path, facts: dict[str, Any]) -> None:
-    """What was written, in words."""
+    """Print the build's place and sizes."""
     typer.echo(f"Written: {place}, build {facts['build']}")
     typer.echo(
         f"Code {facts['code_bytes'] / 1000:.1f} kB, constants {facts['constant_bytes'] / 1000:.1f} kB, settings "
         f"{facts['settings_bytes'] / 1000:.1f} kB; RAM of a navigator {facts['navigator_bytes'] / 1000:.1f} kB"
     )
-    typer.echo(f"README.md says how it is used; `flownav verify {place}` looks at it again")
+    typer.echo(f"README.md explains its use; `flownav verify {place}` looks at it again")
 
 
 def verify(
@@ -71,7 +73,7 @@ def verify(
     horizon: Annotated[float | None, option("S", HORIZON, unset="0.27, or the folder's", within=(0.0, 1.0))] = None,
     as_json: options.Json = False,
 ) -> None:
-    """Replay a flight here, and compare it with what a board or a browser says, to the first difference."""
+    """Replay a flight here, and compare it with the output of a board or a browser, to the first difference."""
     from flownav.api.building import verify as compared
 
     facts = compared(what, record, horizon_s=horizon)

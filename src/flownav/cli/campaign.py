@@ -30,7 +30,7 @@ MODELS = "Each flight's vehicle, wind and sensors drawn, as the datasheets say, 
 FOLDER = f"The folder; {options.KEPT}"
 FLIGHT = "Fly this flight again and write its record: K, CELL:K, or --rare's rare_flight.json."
 RARE = 'How probable this is, to 1e-6: "touchdown.horizontal_m > 1", "crash".'
-Scenarios = Annotated[list[str], argument("SCENARIO", "What is flown", *SCENARIOS, beside="a scenario's FILE.toml")]
+Scenarios = Annotated[list[str], argument("SCENARIO", "The scenario", *SCENARIOS, beside="a scenario's FILE.toml")]
 Flights = Annotated[int | None, option("N", FLIGHTS_OF, unset="1000; with --until or --rare 100000")]
 Out = Annotated[Path | None, out_option(FOLDER, "out/SCENARIO_campaign; with --rare SCENARIO_rare")]
 
@@ -118,7 +118,7 @@ def _folder(asked: Path | None, scenarios: list[Scenario], kind: str) -> Path:
 
 
 def _fly(plan: Plan, engine: Engine, folder: Path, records: int, as_json: bool) -> None:
-    """Fly what the folder lacks; what is said of it."""
+    """Fly the flights that the folder lacks, and print the result."""
     from flownav.api.campaigning import fly_plan
     from flownav.campaigns.store import REPORT
     from flownav.cli.campaign_said import show, watching

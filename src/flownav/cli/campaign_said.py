@@ -1,4 +1,4 @@
-"""What a campaign says: its progress on standard error, a row a cell, the worst flights, and a rare event."""
+"""The output of a campaign: its progress on standard error, a row a cell, the worst flights, and a rare event."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def _interval(figure: dict[str, float | None] | None) -> str:
 
 
 def fly_rare(plan: Plan, event: str, folder: Path, as_json: bool) -> None:
-    """Estimate how probable an event is that hardly ever happens, write it with the most likely flight, and say it."""
+    """Estimate the probability of a very rare event, write it with the most likely flight, and print it."""
     from flownav.api.campaigning import estimate_event, rare_event_of
 
     chosen = rare_event_of(plan, event)

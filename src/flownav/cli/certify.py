@@ -20,7 +20,7 @@ WIDE = 150  # columns of the tables
 FILE = "a requirement's FILE.toml"
 RANKING = "Rows of the ranking of inputs, a power of 2, for each input; 0: none."
 FLIGHTS = "as many as the requirement needs"
-AGAIN = "Fly so many of the flights again, drawn at random; they must be the same to the bit."
+AGAIN = "Fly this number of flights again, drawn at random; they must be the same to the bit."
 SIGN = "Sign the certificate with this Ed25519 key (PEM or OpenSSH); extra `sign`."
 VERIFY = "Look a certificate's folder through: files, rows, figures, flights."
 KEY = "With --verify: the signer's public key."
@@ -44,7 +44,7 @@ JUDGED = (
 
 Requirements = Annotated[
     str | None,
-    argument("REQUIREMENT", "What to show", *options.REQUIREMENTS, beside=FILE, default="none with --verify"),
+    argument("REQUIREMENT", "The requirement", *options.REQUIREMENTS, beside=FILE, default="none with --verify"),
 ]
 
 
@@ -107,7 +107,7 @@ def command(
 
 
 class How(NamedTuple):
-    """What flies; rows of the ranking; records; flights that are flown again; the key that signs."""
+    """The engine; rows of the ranking; records; flights that are flown again; the key that signs."""
 
     engine: Engine
     ranking: int
@@ -147,7 +147,7 @@ def _fly(asked: Requirement, plan: Plan, how: How, name: str, folder: Path) -> d
 
 
 def _verify(folder: Path, requirement: str | None, again: int, key: Path | None, as_json: bool) -> None:
-    """Look a certificate's folder through, and say what holds. VerdictError where something does not."""
+    """Check a certificate's folder, and print what holds. VerdictError where something does not."""
     from flownav.campaigns.certification.verify import verify
     from flownav.campaigns.engines import Local
 
@@ -213,7 +213,7 @@ def _unit(one: dict[str, Any]) -> str:
     return "" if one["tolerance_bound"] is None else str(one["unit"])
 
 
-WIDEST_INDEX = 0.5  # an index whose interval is wider says nothing
+WIDEST_INDEX = 0.5  # an index whose interval is wider shows nothing
 
 
 def _index(row: dict[str, Any], name: str) -> str:

@@ -70,7 +70,7 @@ def command(
 
 
 def _write_cure(explained: Explanation, page: Path, suffixes: dict[str, str]) -> str | None:
-    """The parameter file beside the page; None where no parameter cures anything, or nobody says whose."""
+    """The parameter file beside the page; None where no parameter cures anything, or the autopilot is not known."""
     if not explained.dialect or not any(one.cure.settings for one in explained.findings):
         return None
     path = page.with_suffix(suffixes[explained.dialect])

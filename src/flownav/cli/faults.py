@@ -26,7 +26,7 @@ HOVERS_M, LASTING_S = ["0.5,1.5,3"], {False: "5,20", True: "2,5"}
 
 
 LONG = "How long a fault lasts [s], repeated or with commas."
-OFFLINE = "Put the faults into the log of one flight that is flown on the truth."
+OFFLINE = "Put the faults into the log of one flight whose autopilot uses the truth."
 Faults = Annotated[
     list[str] | None,
     typer.Option(
@@ -37,13 +37,13 @@ Faults = Annotated[
     ),
 ]
 FLOWN_NOTE = (
-    "noticed: more refusals in a second than before, or said. said: the navigator warns; in so many flights, "
-    "median time after the fault began. unsaid: largest horizontal error before that. landed: also after a climb. "
+    "noticed: more refusals in a second than before, or warned. warned: the navigator warns; number of flights, "
+    "median time after the fault began. unwarned: largest horizontal error before that. landed: also after a climb. "
     "around: aloft at the end; the rest did not end in time. off: the pad, at rest; median (worst). 0: -: in no flight."
 )
 LOGGED_NOTE = (
     "noticed: first rejection, event or flag. moved: from the run without, while it lasts. back: as good as without "
-    "the fault, after its end. unsaid: longest time beyond 3 sigma with no event or flag. -: never."
+    "the fault, after its end. unwarned: longest time beyond 3 sigma with no event or flag. -: never."
 )
 
 
@@ -58,7 +58,7 @@ def command(
     seed: options.Seed = 1,
     as_json: options.Json = False,
 ) -> None:
-    """Sensors that fail on a landing: whether the vehicle lands, goes around or crashes, and what is said of it."""
+    """Sensors that fail on a landing: whether the vehicle lands, goes around or crashes, and which warnings come."""
     from flownav.campaigns.faults.catalogue import NOT_FLOWN, faults_named
 
     require_between("--flights", flights, *FLIGHTS)
@@ -131,8 +131,8 @@ FAULT = (Column("fault", "fault"), Column("height [m]", "height_m", "g"), _of_fa
 FLOWN = (
     *FAULT,
     _after("noticed [s]", "noticed"),
-    _after("said [s]", "said"),
-    Column("unsaid [m]", "largest_error_unsaid_m", ".2f"),
+    _after("warned [s]", "said"),
+    Column("unwarned [m]", "largest_error_unsaid_m", ".2f"),
     Column("largest [m]", "largest_error_m", ".2f"),
     Column("landed", "landed"),
     Column("around", "went_around"),
@@ -147,7 +147,7 @@ LOGGED = (
     _of_fault("back [s]", "recovered_after_s", ".2f"),
     _of_fault("wrongly fused", "wrongly_fused", ""),
     Column("touchdown [m]", "touchdown_error_m", ".2f"),
-    Column("unsaid [s]", "unflagged_above_3_sigma_s", ".2f"),
+    Column("unwarned [s]", "unflagged_above_3_sigma_s", ".2f"),
 )
 
 
@@ -175,7 +175,7 @@ def _logged(
 
 
 def navigator(vehicle: str | None = None) -> Navigate:
-    """The navigator on trial, told what the datasheets of the vehicle's sensors state."""
+    """The navigator under test, set up from the datasheets of the vehicle's sensors."""
     from flownav.campaigns.faults.navigator import navigator_of
     from flownav.campaigns.faults.table import scenario_at
     from flownav.simulation.assemble import assemble

@@ -14,11 +14,11 @@ from flownav.core.errors import InputError, VerdictError
 if TYPE_CHECKING:
     from flownav.api.flying import Flights
 
-CRASHES_ALLOWED = 0.05  # of the flights, before the exit status says that the verdict is bad
+CRASHES_ALLOWED = 0.05  # of the flights, before the exit status reports a bad verdict
 
 
 GPS = "GPS errors: white noise as in the paper, or a receiver of 2 m CEP."
-ON = "What the autopilot flies on."
+ON = "The state that the autopilot uses."
 WIND = "Wind at 20 ft in m/s, with gusts, and where it blows from in degrees: 8:270."
 PLANT = "The plant; linear is the paper's model."
 CAMERA = "The pad camera; pixels renders its frames, which takes minutes a flight."

@@ -1,4 +1,4 @@
-"""What `flownav fly` says of a flight, or of many: a sentence, the table of errors, the touchdown, the files."""
+"""The output of `flownav fly` on a flight, or many: a sentence, the table of errors, the touchdown, the files."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def show(facts: dict[str, Any], manifest: Mapping[str, Any], median: int) -> Non
         say(f"largest error of one position axis  {largest} m; paper: {paper['max_position_error_m']:.4f} m")
         say(f"the paper's are of its {paper['title']}: its own filter, with white GPS noise{beside}")
     if "known_exactly" in facts:
-        say(f"given to the vehicle exactly  {facts['known_exactly']}")
+        say(f"known without error  {facts['known_exactly']}")
     if facts.get("takeoff"):
         say(*takeoff_lines(facts["takeoff"], facts["flights"]))
     if facts["touchdown"] is not None:
@@ -70,7 +70,7 @@ def receiver(facts: Mapping[str, Any]) -> str:
 
 
 def title(facts: Mapping[str, Any]) -> str:
-    """What was flown, in a line."""
+    """The flight's title, in a line."""
     flies = "the paper's filter" if facts["filter"] == "paper" else "navigator"
     plant = "" if facts["truth"] == "nonlinear" else ", linear vehicle"
     steered = "" if facts["feedback"] == "estimate" else ", steered by the truth"
@@ -131,7 +131,7 @@ def _many_lines(landing: dict[str, Any]) -> list[str]:
 
 
 def _landed_lines(landing: dict[str, Any], landed: int, flights: int) -> list[str]:
-    """How many flights landed, and what became of the others."""
+    """Number of landings, and the outcomes of the other flights."""
     rate, around = landing["success"], landing["went_around"]
     share = f"(95 % interval {100.0 * rate['low']:.1f}..{100.0 * rate['high']:.1f} %)"
     said = [f"landed  {landed} of {flights} flights, {100.0 * rate['rate']:.1f} % {share}"]
@@ -159,7 +159,9 @@ def _consistency_lines(facts: dict[str, Any]) -> list[str]:
 
 
 def _pad_frames(bands: list[dict[str, Any]]) -> Any:
-    """What was seen in rendered frames, by height, beside what the pad camera's datasheet says of the same frames."""
+    """The table of detections in rendered frames, by height, next to the values of the pad camera's datasheet for the
+    same frames.
+    """
 
     def beside(row: dict[str, Any], said: str, told: str, scale: float) -> str:
         return f"{figure(row[said], scale=scale)} ({figure(row[told], scale=scale)})"

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 LOGS = "Rig folders or their CSV files, or one flight's log."
 ORDER = "The model's order; delay is gain and latency alone."
 HEIGHTS = "Sensor's height [m], one for all logs or one each; repeated or with commas."
-REFERENCE = "What it is held against: of a rig, of a flight."
+REFERENCE = "The reference: of a rig, of a flight."
 FOR = "Also write this autopilot's parameters."
 BASE = "The sensor file for what no log shows (optics, limits)."
 RESPONSES = (

@@ -31,10 +31,10 @@ SYSTEM, COMPONENT = "Listen to this system only.", "Listen to this component onl
 LIMIT = "Send no longer than this without a horizontal aid (dead reckoning) [s]."
 SIGMA = "Send while one standard deviation of the position is below this [m]."
 PROTECTION = "Send while the horizontal protection level is below this [m]."
-UNFUSED = "Send nothing once a horizontal sensor is heard but not fused for so long [s]."
+UNFUSED = "Send nothing once a horizontal sensor is received but not fused for this long [s]."
 ACCEPT = "Who else may send a message, 0 for any; may be repeated."
-DURATION = "End after so many seconds."
-CARRIES = "What the link carries each way."
+DURATION = "End after this time."
+CARRIES = "The link's capacity each way."
 BAUD = "a serial port's by its baud rate"
 SETUP = "Only read the vehicle's parameters, and say what must change for --send."
 WRITE = "With --setup: write what must change, never while armed."
@@ -108,7 +108,7 @@ def command(
 def _navigate(
     url: str, options: Options, record: Path | None, duration_s: float | None, *, force: bool, as_json: bool
 ) -> None:
-    """Navigate until asked to end, and say what came of it. VerdictError where nobody was heard or kept."""
+    """Run until stopped; print the summary. VerdictError where no vehicle was received or no record was kept."""
     from flownav.live.byte_links import open_link
     from flownav.live.display import on_terminal
     from flownav.live.filtering import Keeper
@@ -154,8 +154,8 @@ def _nobody(url: str, facts: dict[str, Any]) -> str:
     others = [f"{system}.{component}" for system, component in facts["other_autopilots"]]
     if others:
         heard = ", ".join(others)
-        return f"{url}: only autopilots that were not asked for were heard ({heard}); see --system, --component"
-    return f"{url}: no autopilot was heard in {facts['duration_s']:.1f} s; see that it sends there"
+        return f"{url}: only autopilots that were not asked for were received ({heard}); see --system, --component"
+    return f"{url}: no autopilot was received in {facts['duration_s']:.1f} s; see that it sends there"
 
 
 @contextmanager
@@ -204,7 +204,7 @@ def _options(
 
 
 def _say_once(shown: bool) -> Callable[[str], None]:
-    """How a recording that stops is told where no screen shows it; from the thread that writes."""
+    """A function that reports once that a recording stopped, where no screen shows it; from the thread that writes."""
 
     def say(reason: str) -> None:
         if not shown:
@@ -263,11 +263,11 @@ def _show(facts: dict[str, Any]) -> None:
     from flownav.live.screen import in_words
 
     vehicle = facts["vehicle"]
-    who = f"system {vehicle['system']}, component {vehicle['component']}" if vehicle else "no vehicle was heard"
+    who = f"system {vehicle['system']}, component {vehicle['component']}" if vehicle else "no vehicle was received"
     say(
         f"{facts['duration_s']:.1f} s, {who}; {facts['sent']} estimates sent, {facts['resets']} resets",
         *(
-            f"ALARM: {name} was heard and not fused for {alarm['unfused_s']:.0f} s ({alarm['reason']})"
+            f"ALARM: {name} was received and not fused for {alarm['unfused_s']:.0f} s ({alarm['reason']})"
             for name, alarm in facts["alarms"].items()
         ),
         *(f"Withheld {count}: {WITHHELD[reason]}" for reason, count in facts["withheld"].items()),

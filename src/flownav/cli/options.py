@@ -1,4 +1,4 @@
-"""What options take, and the options that mean the same in every command, each written once
+"""The types of options' values, and the options that mean the same in every command, each written once
 (docs/reference/cli-grammar.md).
 
 The words to choose from stand here because a shell's completion may load nothing heavy; tests hold them against
@@ -169,7 +169,7 @@ Topic = Annotated[list[str] | None, option("ROLE=TOPIC", TOPIC, "--topic")]
 GpsDelay = Annotated[float, option("S", "How old a GPS reading is when it arrives [s].", "--gps-delay")]
 SIGNING = "MAVLink 2 signing key: 32 bytes or 64 digits."
 SigningKey = Annotated[Path | None, option("FILE", SIGNING, "--signing-key")]
-Records = Annotated[int, option("N", "Write records and reports of so many of the worst flights.", "--records")]
+Records = Annotated[int, option("N", "Write records and reports of this number of the worst flights.", "--records")]
 Vehicle = Annotated[str | None, chosen("The vehicle that flies.", *VEHICLES, flag="--vehicle", beside="FILE.toml")]
 SCENARIOS_OWN = "as the scenario says"
 OWN_FILTERS: dict[str, Any] = {"flag": "--filter", "beside": "FILE.py:CLASS", "also": installed_filters}
@@ -182,7 +182,7 @@ LOG_KINDS = "a CSV folder, .ulg, .bin, .tlog, or a record (.fnr)"
 Log = Annotated[Path, named("LOG", f"A log: {LOG_KINDS}.")]
 Logs = Annotated[list[Path], named("LOG", f"Logs, each {LOG_KINDS}.")]
 Record = Annotated[Path, named("RECORD.fnr", "A record, as fly, replay and live write it.")]
-Scenario = Annotated[str, argument("SCENARIO", "What is flown", *SCENARIOS, beside="a scenario's FILE.toml")]
+Scenario = Annotated[str, argument("SCENARIO", "The scenario", *SCENARIOS, beside="a scenario's FILE.toml")]
 
 
 def out_option(what: str, default: str = "") -> Any:

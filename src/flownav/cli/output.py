@@ -1,4 +1,4 @@
-"""What every command says the same way: progress, where files go, one JSON object or tables, each described once.
+"""The output that all commands share: progress, where files go, one JSON object or tables, each described once.
 
 A column of a table is its title, its key in the row, and how its figure is written.
 """
@@ -50,11 +50,11 @@ def require_between(option: str, value: float, low: float, high: float) -> None:
 
 
 def place(path: Path, *inputs: str | Path | None, force: bool, beside: Sequence[str] = ()) -> Path:
-    """Where a file is written: at `path`, or under the next free number where something is there, said on stderr.
+    """Where a file is written: at `path`, or under the next free number where something is there, reported on stderr.
 
-    inputs: what the run reads (None for an option that is not given; a name that is no path does no harm). beside:
-    suffixes of what is written beside it. force: what is there is replaced, if flownav wrote it. InputError, before the
-    work is done, where nothing must or can be put there.
+    inputs: the files that the run reads (None for an option that is not given; a name that is no path does no harm).
+    beside: suffixes of files written next to it. force: an existing file is replaced, if flownav wrote it. InputError,
+    before the work is done, where nothing must or can be put there.
     """
     from flownav.core.free_names import a_place
 
@@ -99,7 +99,7 @@ def record_place(path: Path, *inputs: str | Path | None, force: bool, report: bo
 
 
 def told(asked: Path, found: Path, *, replaces: bool = True) -> Path:
-    """The path that is written, which is said where it is not the one that was asked for."""
+    """The path that is written; printed on stderr where it is not the one that was asked for."""
     if found != asked:
         how = " (--force replaces it)" if replaces else ""
         print(f"flownav: {asked} is there already{how}; writing {found}", file=sys.stderr)
@@ -213,7 +213,7 @@ def plain_look(*, edge: bool = True) -> dict[str, Any]:
 def say(*things: Any, wide: int = 0, soft: bool = False) -> None:
     """Print tables and lines. soft: long lines are not broken.
 
-    On a terminal, and where COLUMNS says how wide one is, tables fit its width; into a file or a pipe things have
+    On a terminal, and where COLUMNS gives a width, tables fit its width; into a file or a pipe things have
     `wide` columns at least.
     """
     from rich.console import Console

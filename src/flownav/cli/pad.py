@@ -58,7 +58,7 @@ MEASURED = (
 def command(
     frames: Annotated[list[Path] | None, typer.Argument(help=YOURS, show_default=False)] = None,
     side: Annotated[float, option("M", SIDE)] = 0.2,
-    pattern: Annotated[str, chosen("What is printed on the pad.", *options.PATTERNS)] = "tag",
+    pattern: Annotated[str, chosen("The pattern printed on the pad.", *options.PATTERNS)] = "tag",
     code: Annotated[int, option("N", "Which tag of AprilTag 36h11, 0 to 15.")] = 0,
     focal: Annotated[float | None, option("PX", FOCAL, unset=False, within=(1.0, 1e6))] = None,
     image_x: Annotated[float, option("DEG", IMAGE_X, "--image-x-deg")] = 0.0,

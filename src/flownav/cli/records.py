@@ -103,7 +103,7 @@ def export_to(
 
 
 def recover(
-    journal: Annotated[Path, named("FILE.fnr.journal", "What a killed `flownav live` left.")],
+    journal: Annotated[Path, named("FILE.fnr.journal", "The journal that a killed `flownav live` left.")],
     out: Annotated[Path | None, out_option("The record", "FILE.fnr")] = None,
     force: options.Force = False,
     as_json: options.Json = False,

@@ -105,7 +105,7 @@ def _explained(log: Log) -> dict[str, Any]:
 
 
 def _options(gps_delay_s: float, outages: list[str], flow_scale: str, *, no_flow: bool) -> ReplayOptions:
-    """What is withheld, scaled and late. InputError where a window or the factors are none."""
+    """The replay's options: outages, factors, delay. InputError where a window or the factors are none."""
     from flownav.replays.prepare import ReplayOptions
 
     cuts = [text for given in outages for text in given.split(",")]
@@ -143,7 +143,7 @@ def show(record: Record, scores: dict[str, Any], *, verbose: bool = False) -> No
 
 
 def error_lines(scores: dict[str, Any]) -> list[str]:
-    """What the errors are, against each thing that there is to hold the estimate against, a sentence a line."""
+    """The errors against each reference that there is, a sentence a line."""
     said, truth = [], scores.get("truth")
     if "outage_median_rms_m" in scores:
         median, worst = figure(scores["outage_median_rms_m"]), figure(scores["outage_worst_rms_m"])
@@ -213,7 +213,9 @@ def _protection(found: dict[str, Any]) -> str:
 
 
 def _rejected(scores: dict[str, Any]) -> Any:
-    """What was not fused and why, in readings and in components (a row that the reader threw away is one)."""
+    """The table of readings that were not fused and why, in readings and in components (a row that the reader threw
+    away is one).
+    """
     rows = []
     for sensor, counted in scores["readings"].items():
         read, components = counted["read"], scores["rejected"].get(sensor, {})
@@ -290,7 +292,7 @@ def _print(facts: dict[str, Any]) -> None:
         say(said if share is None else f"{said}; {100 * share:.1f} % of readings outside")
     say(f"Compared: {facts['checked']}", *(f"Warning: {text}" for text in facts["warnings"]))
     if facts["absences"]:
-        say("What is missing, and what is done instead:")
+        say("Missing sensors, and the substitutes used:")
         say(*(padded(f"{absence['what']}: {absence['instead']}") for absence in facts["absences"]))
     own, truth = facts["autopilot"], facts["truth"]
     if own:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 HEIGHTS_M = ["0.6"]
 HEIGHT = "Sensor's height above the pad at rest [m], repeated or with commas."
 EXCITATION = "How it is swung; swing is the paper's."
-PAD = "What it looks at; MM is the stripes' width."
+PAD = "The target; MM is the stripes' width."
 FOLDER = "The folder, with a folder in it for each of several runs"
 COLUMNS = (
     Column("folder", "folder"),
@@ -86,7 +86,7 @@ def _swung(settings: RigSettings, heights_m: list[float], folder: Path) -> list[
 
 
 def _facts(log: RigLog, folder: Path) -> dict[str, Any]:
-    """What a run was and what it looks like."""
+    """The facts of a run: its folder, geometry and peak velocity."""
     import numpy as np
 
     return {
@@ -132,7 +132,7 @@ def sample(
         return
     for note in notes:
         typer.echo(f"Note: {note}")
-    typer.echo(f"{folder / 'README.txt'} says what each holds.")
+    typer.echo(f"{folder / 'README.txt'} describes each.")
 
 
 def _list(*, as_json: bool) -> None:
@@ -152,7 +152,7 @@ def _facts_written(written: list[Written]) -> list[dict[str, Any]]:
 
 
 def _quiet(written: Written) -> None:
-    """A listener who says nothing beside the JSON object."""
+    """A listener that prints nothing next to the JSON object."""
 
 
 def _show_written(written: Written) -> None:

@@ -1,4 +1,4 @@
-"""`flownav sitl`: a real autopilot's simulator flown on flownav's estimate, with faults, scored against its truth."""
+"""`flownav sitl`: a real autopilot's simulator flies on flownav's estimate, with faults, scored against its truth."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ OUT = "Folder of records and figures; what is there already is not flown again."
 WIDE = 150
 NOTE = (
     "hover: the vehicle from where its hover began, rms. drift: the estimate in that time. error: largest that was "
-    "sent, level and down, since the last counted reset. unsaid: how long it was beyond 1 m. silent: longest gap in "
+    "sent, level and down, since the last counted reset. unwarned: how long it was beyond 1 m. silent: longest gap in "
     "sending. strayed: from the commanded path. touchdown: from the place of take-off, R95. Median (worst)."
 )
 
@@ -50,7 +50,7 @@ COLUMNS = (
     _cell("drift [m]", "error_rms_m"),
     _cell("error [m]", "error_m"),
     _cell("down [m]", "error_down_m"),
-    _cell("unsaid [s]", "unsaid_s", ".1f"),
+    _cell("unwarned [s]", "unsaid_s", ".1f"),
     _cell("silent [s]", "silent_s", ".1f"),
     _cell("strayed [m]", "strayed_m", ".1f"),
     Column("touchdown [m]", lambda row: figure(row["touchdown_r95_m"], ".2f")),
@@ -61,8 +61,8 @@ COLUMNS = (
 def command(
     autopilot: Annotated[str, argument("AUTOPILOT", "Whose simulator", *options.AUTOPILOTS[::-1])],
     vehicle: Annotated[str | None, chosen("Which vehicle.", *VEHICLES, unset="heli, of PX4 quad")] = None,
-    scenario: Annotated[str, chosen("What is flown.", *SCENARIOS)] = "square",
-    gps: Annotated[str | None, chosen("What becomes of GPS.", *GPS, unset="the scenario's")] = None,
+    scenario: Annotated[str, chosen("The scenario.", *SCENARIOS)] = "square",
+    gps: Annotated[str | None, chosen("The use of GPS.", *GPS, unset="the scenario's")] = None,
     fault: Annotated[list[str] | None, option("NAME@T[+S]", FAULT)] = None,
     flights: Annotated[int, option("N", "Flights of each row.", within=(1, 10_000))] = 1,
     beside: Annotated[int, option("N", "Flights beside each other.", within=(1, 9))] = 1,

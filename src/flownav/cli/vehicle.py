@@ -168,7 +168,7 @@ def show_margins(file: Path | None, *, as_json: bool) -> None:
 
 
 def margins_of_flight(record: Path) -> Box:
-    """What the gains of a recorded flight keep, for the vehicle that it learnt. InputError where it learnt none."""
+    """The margins of a recorded flight's gains, for the vehicle that it learnt. InputError where it learnt none."""
     from flownav.api.record import load
     from flownav.control.learnt_margins import margins_of_record
 

@@ -1,9 +1,10 @@
-"""A position that no GPS holds is about a place; where it was lost, that place is said anew, as a jump that is counted.
+"""The place that a position without GPS refers to; where that place was lost it is set again, as a counted jump.
 
-Dead reckoning by flow has no truth to come back to: after a spell in which the flow could not be believed, how far the
-vehicle went meanwhile is not known, and waiting does not tell it. While the spell lasts the velocity alone is sent.
-Once flow and inertial sensors have agreed again for AGREED_S, what is sent goes on from where the filter believes it
-is: the limits are then of what has been added since, and the autopilot, told by the counter, goes there.
+Dead reckoning by flow has no truth to return to: after a period in which flow was not trusted, the distance covered
+meanwhile is unknown, and waiting does not reveal it. During the period only the velocity is sent. Once flow and
+inertial sensors have agreed again for AGREED_S, sending continues from where the filter believes the vehicle is: the
+limits then apply to the error added since, and the autopilot, which sees the reset counter change, moves its estimate
+there.
 """
 
 import math
@@ -18,14 +19,14 @@ from flownav.navigation.memory import PROTECTION, load_flow, load_gps, load_susp
 
 AGREED_S = 1.0  # chosen: ten readings of a flow of 10 Hz; held by test_live_recordings
 UNHELD_S = 2.0  # without a fix for so long the position is the flow's: chosen, two of a receiver of 1 Hz
-FLOW_S = 0.5  # an older flow reading says nothing of now: chosen
+FLOW_S = 0.5  # an older flow reading is no evidence of the present: chosen
 CAUSED_S = 3.0  # a suspicion that begins so soon after a doubt, or during one, is of what caused the doubt: chosen
 PLACES = ("flow_doubted", "fault_suspected", "unprotected", "uncertain")  # reasons that are of the place alone
 
 
 class Base(NamedTuple):
-    """What is known to be wrong with a place and is not counted any more: its protection level [m], its variance [m2],
-    and the suspicion that belongs to it, by its beginning [s].
+    """Known errors of a place that are no longer counted: its protection level [m], its variance [m2], and the
+    suspicion that belongs to it, by its start time [s].
     """
 
     protection_m: float = 0.0
@@ -37,7 +38,7 @@ NOTHING = Base()
 
 
 class Anchor:
-    """The place that what is sent is about. moves: how often it was said anew."""
+    """The place that the sent position refers to. moves: number of times it was set again."""
 
     def __init__(self) -> None:
         self.base = NOTHING
@@ -50,7 +51,7 @@ class Anchor:
         self._agreed_s = self._doubted_s = math.nan
 
     def watch(self, on: Running, t_s: float) -> None:
-        """What the navigator says by now."""
+        """Update from the navigator's state at `t_s`."""
         flow = load_flow(on.work, ONE_LANE, 0)
         if flow.doubted > 0.0 or not on.clock_s <= flow.taken_s + FLOW_S:
             self._agreed_s = math.nan
@@ -68,14 +69,14 @@ class Anchor:
         return t_s - self._agreed_s >= AGREED_S
 
     def may_move(self, on: Running, t_s: float) -> bool:
-        """Whether the place may be said anew: nothing else holds it, and flow has been good for long enough."""
+        """Whether the place may be set again: nothing else holds it, and flow has been good for long enough."""
         if holds(on) or not self.agrees(t_s):
             return False
         suspicion = load_suspicion(on.work, ONE_LANE, 0)
         return bool(suspicion.suspected == 0.0 or suspicion.suspected_s <= self._doubted_s + CAUSED_S)
 
     def move(self, on: Running, *, jumps: bool) -> None:
-        """Say it anew; a jump where no place was sent meanwhile."""
+        """Set the place again; a jump where no place was sent meanwhile."""
         self.moves += jumps
         suspicion = load_suspicion(on.work, ONE_LANE, 0)
         level_m = float(on.work[PROTECTION])
@@ -87,7 +88,7 @@ class Anchor:
 
 
 def holds(on: Running) -> bool:
-    """Whether GPS has told the position lately."""
+    """Whether GPS has given the position within UNHELD_S."""
     return bool(on.clock_s <= load_gps(on.work, ONE_LANE, 0).told_s + UNHELD_S)
 
 

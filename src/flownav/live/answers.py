@@ -1,4 +1,4 @@
-"""The estimate of now, whether it may be sent, and what is said to a vehicle."""
+"""The current estimate, whether it may be sent, and the messages that go to the vehicle."""
 
 import math
 from typing import Any
@@ -34,16 +34,16 @@ from flownav.navigation.progress import LONGEST_AHEAD_S
 UNFUSED = "unfused"  # a reason that the session finds (horizon.Serving)
 INVALID_FLAG = 2.0  # the flag of `memory.AidMemory`
 WITHHELD = {
-    "no_vehicle": "no autopilot's HEARTBEAT is heard",
+    "no_vehicle": "no autopilot's HEARTBEAT is received",
     "listening": "the vehicle is being listened to",
     "not_started": "the filter waits for an attitude and a fix or flow",
     "stale": "the newest reading is too old",
     "position_invalid": "no horizontal aid for long: the position is invalid",
     "dead_reckoning": "no horizontal aid for too long",
-    "unfused": "a horizontal sensor is heard and not fused",
-    "fault_suspected": "innovations tell of a sensor that fails",
+    "unfused": "a horizontal sensor is received and not fused",
+    "fault_suspected": "innovations show that a sensor fails",
     "unprotected": "a sensor that fails unseen may have put the position too far off",
-    "origin_doubted": "the autopilot's origin is far from the fixes, and it does not say where it is in it",
+    "origin_doubted": "the autopilot's origin is far from the fixes, and its own position in it is not sent",
     "not_finite": "the estimate is not a finite number",
     "uncertain": "the position's standard deviation is too large",
     "too_fast": "the velocity's standard deviation is too large",
@@ -56,7 +56,7 @@ WITHHELD = {
 OWN_SYSTEM = 1  # until the vehicle's is known, which we then are of
 RELATIVE_S = 1.0  # of dead reckoning, what is stated is how far off it may go in so long
 RELATIVE_FLOOR_M = 0.05  # and what differs from one estimate to the next: chosen
-STEEPEST_COSINE = 0.1  # cosine of the steepest sight of the pad that is told, 84 deg: chosen, beyond any camera's view
+STEEPEST_COSINE = 0.1  # cosine of the steepest sight of the pad that is sent, 84 deg: chosen, beyond any camera's view
 
 
 def why_withheld(on: Running | None, t_s: float, newest_s: float, limits: Limits, base: Base = NOTHING) -> str:
@@ -141,7 +141,7 @@ def quality_of(on: Running, pose: Array, velocity: Array, t_s: float, limits: Li
 
 
 def fault_of(estimate: say.Estimate, limits: Limits, base: Base = NOTHING) -> str:
-    """What is wrong with an estimate itself: `not_finite`, `too_fast`, `uncertain_down`, `uncertain`, or ""."""
+    """Why the estimate itself must not be sent: `not_finite`, `too_fast`, `uncertain_down`, `uncertain`, or ""."""
     assert estimate.pose_covariance is not None
     assert estimate.velocity_covariance is not None
     pose, velocity = np.diag(estimate.pose_covariance), np.diag(estimate.velocity_covariance)
@@ -156,9 +156,9 @@ def fault_of(estimate: say.Estimate, limits: Limits, base: Base = NOTHING) -> st
 
 
 def as_relative(estimate: say.Estimate) -> say.Estimate:
-    """The accuracy of a place that dead reckoning tells: of where it is from where it was a second ago.
+    """The accuracy of a dead-reckoned place relative to the place of a second ago.
 
-    What has been lost since the start is lost for the autopilot as well, which follows this place and has no other. If
+    The error since the start is the autopilot's as well, which follows this place and has no other. If
     the whole of it were stated, its filter would take the place for bad, follow the velocity, and drift by itself.
     """
     assert estimate.pose_covariance is not None

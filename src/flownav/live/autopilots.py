@@ -1,8 +1,8 @@
-"""Who of those heard on a link is the vehicle's autopilot: by what its HEARTBEAT says it is, and by what it tells.
+"""Which sender on a link is the vehicle's autopilot: by the type in its HEARTBEAT, and by the messages it sends.
 
-One HEARTBEAT is one witness. A gimbal may say that it is an autopilot, and another vehicle's may be heard first; an
-autopilot that is asked tells how it moves and where it is. Until an estimate is sent a better one is taken in place of
-the first; from then on it is only said.
+One HEARTBEAT is one witness. A gimbal may announce itself as an autopilot, and another vehicle's may be received first;
+an autopilot that is asked sends its motion and its position. Until an estimate is sent, a better one replaces the
+first; from then on it is only reported.
 """
 
 from dataclasses import dataclass
@@ -17,15 +17,16 @@ NO_VEHICLES = {5, 6, 18, 26, 27, 30, 31, 32, 33, 34, 36, 37, 38, 39, 40, 41, 42,
 NONE, COMPONENT, VEHICLE, KNOWN = range(4)  # what a HEARTBEAT makes of its sender, the better later
 MOVES = ("HIGHRES_IMU", "RAW_IMU", "SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3", "ATTITUDE", "ATTITUDE_QUATERNION")
 PLACES = ("GPS_RAW_INT", "OPTICAL_FLOW", "OPTICAL_FLOW_RAD")
-TURN_S = 5.0  # to tell both: chosen; an autopilot that answers was asked for all within 2 s (test_live_recordings)
+TURN_S = 5.0  # to send both: chosen; an autopilot that answers was asked for all within 2 s (test_live_recordings)
 MOST = 64  # that are remembered: chosen
 
 
 def standing(component: int, kind: int, make: int, *, named: bool = False) -> int:
-    """What a HEARTBEAT makes of its sender; kind: MAV_TYPE, make: MAV_AUTOPILOT.
+    """The standing of a sender by its HEARTBEAT; kind: MAV_TYPE, make: MAV_AUTOPILOT.
 
-    NONE: no autopilot. COMPONENT: it says so, with another component's number. VEHICLE: an autopilot by its number as
-    well. KNOWN: of a make whose streams we know. named: it was asked for by its number, which is enough.
+    NONE: no autopilot. COMPONENT: an autopilot by its type, with another component's number. VEHICLE: an autopilot
+    by its number as well. KNOWN: of a make whose streams we know. named: it was asked for by its number, which is
+    enough.
     """
     if make == INVALID_AUTOPILOT:
         return NONE
@@ -38,9 +39,9 @@ def standing(component: int, kind: int, make: int, *, named: bool = False) -> in
 
 @dataclass
 class Heard:
-    """One that may be the autopilot.
+    """A sender that may be the autopilot.
 
-    moves, places: whether it told how it moves and where it is. turn_s: our clock when it was taken, None while it
+    moves, places: whether it sent its motion and its position. turn_s: our clock when it was taken, None while it
     never was.
     """
 
@@ -53,16 +54,16 @@ class Heard:
 
     @property
     def told(self) -> int:
-        """How much of what is needed it has told: 0, 1 or 2, which is all."""
+        """The number of the two needed kinds of message (motion, position) that it has sent: 0, 1 or 2."""
         return self.moves + self.places
 
     def may_serve(self, now_s: float, *, taken: bool) -> bool:
-        """Whether it has told all, or has not had its time to; taken: it is the one that is listened to."""
+        """Whether it has sent both, or still has time to; taken: it is the one in use."""
         return self.told == 2 or self.turn_s is None or (taken and now_s - self.turn_s <= TURN_S)
 
 
 class Autopilots:
-    """All that were heard. component: the one that is asked for, if any."""
+    """All senders received so far. component: the one that is asked for, if any."""
 
     def __init__(self, component: int | None = None) -> None:
         self._named = component is not None
@@ -95,7 +96,7 @@ class Autopilots:
         serving = [one for one in heard if one.may_serve(now_s, taken=one is current)]
         if serving:
             best = max(serving, key=lambda one: (one.told == 2, one.standing, one.told, one is current))
-        else:  # of those that tell nothing one after the other is asked
+        else:  # of those that send neither one after the other is asked
             best = max(heard, key=lambda one: (one.told, one is current and one.told > 0, -(one.turn_s or 0.0)))
         if best is current:
             return None

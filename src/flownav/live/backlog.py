@@ -1,7 +1,7 @@
-"""What was sent and may not have been read: an estimate that waits to be read is old when it is.
+"""The bytes that were sent and may not have been read: an estimate that waits in a buffer is old when it is read.
 
 A stream's own buffers hold a second's estimates, and the far side's hold ten; a bridge to a slow line reads from them
-no faster than that line carries. Its kernel acknowledges what nobody has read. An answer to TIMESYNC does tell: all
+no faster than that line carries. Its kernel acknowledges what nobody has read. An answer to TIMESYNC does show it: all
 that was sent before the question has been read. Where answers take longer than the shortest way there and back, as much
 is let on its way as is read within QUEUE_S.
 """
@@ -11,9 +11,9 @@ from collections import deque
 from typing import NamedTuple
 
 ASK_S = 0.2  # between questions: chosen, 140 bytes/s each way
-QUEUE_S = 0.2  # that a message may wait to be read: chosen, 4 m at 20 m/s would be told 0.2 s late
+QUEUE_S = 0.2  # that a message may wait to be read: chosen, 4 m at 20 m/s would arrive 0.2 s late
 LEAST_BYTES = 500  # on their way at least: two estimates of 244 bytes
-FIRST_BYTES = 3000  # at first: 50 estimates/s of ASK_S; more where so many are read in time
+FIRST_BYTES = 3000  # at first: 50 estimates/s of ASK_S; more where this number of bytes is read in time
 MOST_BYTES = 65536
 MOST_ASKED = 8  # questions that wait; who answers none is not asked for ever
 GROWTH = 1.5  # of what may be on its way with each answer in time: chosen
@@ -30,7 +30,7 @@ class Asked(NamedTuple):
 class Backlog:
     """Bytes on their way to a reader, and whether an estimate may follow them.
 
-    Who has answered nothing yet is not judged. spells: how often a reader was found slow.
+    A reader that has not answered yet is not judged. spells: how often a reader was found slow.
     """
 
     def __init__(self) -> None:
@@ -43,7 +43,7 @@ class Backlog:
         self._asked_s = -math.inf
 
     def put(self, size: int) -> None:
-        """So many bytes were sent."""
+        """Count `size` bytes as sent."""
         self._sent += size
 
     def due(self, now_s: float) -> bool:

@@ -105,7 +105,7 @@ class TcpLink(ByteLink):
         return found.fileno() if found else -1
 
     def read(self) -> list[Piece]:
-        """What has arrived; a broken connection is made again."""
+        """Bytes that have arrived; a broken connection is made again."""
         if self._connection is None:
             self._connect()
             return []
@@ -207,7 +207,7 @@ class SerialLink(ByteLink):
         return int(self._port.fileno()) if self._port is not None else -1
 
     def read(self) -> list[Piece]:
-        """What has arrived."""
+        """Bytes that have arrived; a lost port is opened again."""
         if self._port is None:
             self._tries += 1
             if self._tries % 100 == 0:

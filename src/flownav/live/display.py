@@ -23,7 +23,7 @@ DRAWN = b"."
 
 
 class View(NamedTuple):
-    """What the screen shows at an instant, as text: taken between two readings, drawn whenever the terminal takes it.
+    """The screen's content at an instant, as text: taken between two readings, drawn whenever the terminal takes it.
 
     alarms: what somebody must know now, above all else. sensors: rows of the table of sensors. estimate: rows of the
     estimate. strips: name, bars and newest value. lines: below them.

@@ -1,9 +1,9 @@
 """PX4's magnetometer without what its EKF2 has learnt of it in flight.
 
-HIGHRES_IMU tells the calibrated field less the bias that EKF2 estimates from its own heading. Where that heading
-follows ours, an error of ours comes back as a field that agrees with it. SCALED_IMU tells the sensor's own field, which
+HIGHRES_IMU gives the calibrated field less the bias that EKF2 estimates from its own heading. Where that heading
+follows ours, an error of ours comes back as a field that agrees with it. SCALED_IMU gives the sensor's own field, which
 is neither calibrated nor, of some sensors, turned into the vehicle's axes. The difference of the two is the calibration
-and EKF2's bias: by what it has changed since the start is EKF2's, and is put back.
+and EKF2's bias: its change since the start is EKF2's, and is put back.
 """
 
 import math
@@ -13,7 +13,7 @@ from statistics import median
 from flownav.core.frames import Vector
 from flownav.logs.mavlink.framing import Message
 
-MILLI = 1e-3  # SCALED_IMU tells thousandths of gauss
+MILLI = 1e-3  # SCALED_IMU is in thousandths of gauss
 LEAST_PAIRS = 15  # by which the calibration is known: chosen, a second of PX4's magnetometer
 APART_S = 0.1  # the two are of one instant: chosen
 SMOOTH_S = 3.0  # of the difference; EKF2 learns over tens of seconds: chosen
@@ -23,7 +23,7 @@ MOST_SHARE = (
 
 
 class Field:
-    """The sensor's own field beside the one that EKF2 has changed [gauss]."""
+    """The sensor's own field, compared with the one that EKF2 has changed [gauss]."""
 
     def __init__(self) -> None:
         self.clear()
@@ -44,7 +44,7 @@ class Field:
             self._own_s = t_s
 
     def restored(self, told: Vector, t_s: float) -> Vector:
-        """A field that HIGHRES_IMU tells, with what EKF2 has taken off since the start put back."""
+        """The field of HIGHRES_IMU, with EKF2's subtraction since the start put back."""
         if self._own is not None and self.comparable and abs(t_s - self._own_s) <= APART_S:
             self._compare(told, _less(told, self._own), t_s)
         if self._first is None or not self.comparable:

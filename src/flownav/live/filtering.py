@@ -1,4 +1,4 @@
-"""The navigator behind the horizon: the rings on which readings wait, what it is fed in batches, what comes of it."""
+"""The navigator behind the horizon: the rings on which readings wait, the batches it is fed, and its outputs."""
 
 import math
 from collections.abc import Sequence
@@ -43,7 +43,7 @@ class Keeper:
         """A batch is about to be fed."""
 
     def written(self, estimate: Array, innovation: Array, event: Array) -> None:
-        """What came of it."""
+        """Keep the estimates, innovations and events of the batch."""
 
     def note(self, t_s: float, source: str, kind: str, detail: str, value: float = NAN) -> None:
         """A happening."""
@@ -52,11 +52,11 @@ class Keeper:
         """The navigator's frame has this origin from now on."""
 
     def truth(self, t_s: float, state: TrueState) -> None:
-        """What a simulator says is so."""
+        """Keep a simulator's true state at `t_s`."""
 
 
 class Outcome(NamedTuple):
-    """What the last batch brought: how many readings it had, and rows of the tape's innovation and event."""
+    """The result of the last batch: its number of readings, and the tape's rows of innovation and event."""
 
     readings: int
     innovation: Array
@@ -146,12 +146,12 @@ class Filtering:
 
     @property
     def lacks_imu(self) -> bool:
-        """Whether a navigator runs that was told that no IMU serves."""
+        """Whether a navigator runs that was set up without an IMU."""
         return self.running is not None and not self.running.told.equipment.use_imu
 
     @property
     def lacks_gps(self) -> bool:
-        """Whether a navigator runs that was told of no receiver."""
+        """Whether a navigator runs that was set up without a GPS receiver."""
         return self.running is not None and not np.isfinite(self.running.told.equipment.deadline_s)
 
     def imu_rate_hz(self, t_s: float) -> float:
@@ -169,7 +169,7 @@ def handed_over(reading: Measurement, exposure_s: float, known: IdentifiedFlow |
 
 
 def _streams(listened: EventQueue) -> dict[Sensor, Stream]:
-    """What was listened to, as streams."""
+    """The readings collected while listening, as streams by sensor."""
     return {
         Sensor(number): Stream.of(
             Sensor(number),
@@ -183,7 +183,7 @@ def _streams(listened: EventQueue) -> dict[Sensor, Stream]:
 
 
 def own_declination_rad(streams: dict[Sensor, Stream]) -> float:
-    """Where nobody says where on earth the vehicle is: the bearing of the field by the autopilot's own attitude [rad].
+    """For a vehicle without a known place on earth: the bearing of the field by the autopilot's own attitude [rad].
 
     The frame that is sent is then the autopilot's, whatever its compass and its idea of north are. 0 without attitude.
     """

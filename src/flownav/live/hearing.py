@@ -75,7 +75,7 @@ class Hearing:
 
     @property
     def dropped(self) -> Counter[str]:
-        """What was dropped, by sensor and reason."""
+        """Number of dropped readings by sensor and reason."""
         other = {f"{sensor.name.lower()}: other source": n for sensor, n in self.sources.dropped.items()}
         return self.counts + Counter(other)
 
@@ -88,7 +88,7 @@ class Hearing:
         now_s: float,
         here_ned_m: Vector | None = None,
     ) -> str:
-        """What a message measures, onto the rings. here_ned_m: where a running navigator is, if any.
+        """Put a message's measurements onto the rings. here_ned_m: where a running navigator is, if any.
         Returns `clock_jump` where the autopilot began anew."""
         sender = sender_of(message)
         by_autopilot = sender == vehicle[:2]
@@ -122,7 +122,7 @@ class Hearing:
         return reading._replace(value=self.field.restored((x, y, z), reading.t_s))
 
     def _compared(self, source: Source, vehicle: Vehicle, reading: Measurement, now_s: float) -> bool:
-        """An inertial reading, held against the others' where it is news; whether it says anything."""
+        """Whether an inertial reading may be used: new, and compared with the other sources'."""
         if self.repeats.is_crowded(source, reading.t_s):
             self.counts[f"imu: {CROWDED}"] += 1
             return False
@@ -149,7 +149,9 @@ class Hearing:
             self.sources.first.pop(Sensor.IMU, None)
 
     def _compare(self, source: Source, reading: Measurement, now_s: float) -> None:
-        """An inertial reading beside the others'. What a wrong one said is taken back, another's put in its place."""
+        """Compare an inertial reading with the other sources'. Readings of a faulty source are taken back and another
+        source's are put in their place.
+        """
         barred = self.sources.barred.get(Sensor.IMU, set())
         swap = self.inertial.heard(source, reading, self.sources.chosen(Sensor.IMU), barred)
         alone = not self.sources.alive(Sensor.IMU, reading.t_s)
@@ -164,7 +166,7 @@ class Hearing:
             self._reading(sample.reading, now_s)
 
     def _fix(self, message: Message, here_ned_m: Vector | None) -> None:
-        """A receiver is one that has had a fix (ArduPilot tells of one that it does not have); the first of all fixes
+        """A receiver is one that has had a fix (ArduPilot reports one that it does not have); the first of all fixes
         is where the vehicle is."""
         place = fix_deg_m(message)
         if message.fix_type < LEAST_FIX or place is None:

@@ -2,7 +2,7 @@
 
 Of each kind of sensor one source serves, the preferred message that is alive. Readings wait until everything of their
 instant must have arrived, as long as the slowest stream runs behind the newest reading, then go on in its order. A
-sensor that is heard and does not serve is an alarm, since what is sent then rests on less than the vehicle has.
+sensor that is received and not used is an alarm, since the estimate then rests on less than the vehicle has.
 """
 
 from collections import Counter, deque
@@ -15,20 +15,22 @@ from flownav.logs.mavlink.messages import PREFERENCE
 from flownav.navigation.reasons import HORIZONTAL, REFUSALS
 from flownav.navigation.rows import InnovationRow
 
-SILENT_S = 2.0  # a source that says nothing for so long gives way
+SILENT_S = 2.0  # a source that is silent for this long gives way
 # Chosen, and held by test_live_recordings: ArduPilot repeats a fix of 5 Hz at 10 Hz, its first copy up to 0.1 s old;
 # with a horizon that did not follow it, all fixes came too late on most starts.
 WINDOW_S = 5.0
-PATIENT_WINDOWS = 4  # a stream that comes in time again is waited for so many windows longer
+PATIENT_WINDOWS = 4  # a stream that comes in time again is waited for this number of windows longer
 WATCHED = (*HORIZONTAL, Sensor.RANGE, Sensor.LANDED)
 DOWNWARD = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.RANGE)  # on the ground they need not serve
 LATE = Reason.LATE.label
 LEAST_READINGS = 10  # chosen: 2 s of a 5 Hz receiver
-GONE_S = 2.0  # a sensor that has said nothing for so long is silent, which the screen shows otherwise: chosen
+GONE_S = 2.0  # a sensor without a message for this long is silent, which the screen shows otherwise: chosen
 
 
 class Source(NamedTuple):
-    """Who measured: message, instance, and whether the autopilot itself tells it (False: another component)."""
+    """The source of a reading: message, instance, and whether the autopilot itself sends it (False: another
+    component).
+    """
 
     message: str
     instance: int
@@ -56,7 +58,7 @@ class Sources:
         return found.source if found is not None else None
 
     def bar(self, sensor: Sensor, source: Source) -> None:
-        """This source must not serve any more; the next one that speaks does."""
+        """Bar a source from use; the next one that sends a reading takes its place."""
         self.barred.setdefault(sensor, set()).add(source)
         if self.chosen(sensor) == source:
             del self._chosen[sensor]
@@ -94,7 +96,7 @@ class Lags:
     """The greatest lag of each sensor's readings over the last 15 to 20 s, on the vehicle's clock.
 
     A reading's lag is the newest instant that any sensor has described, less its own. It holds the sensor's own delay,
-    the phase between a reading and the message that tells it, and what one message is faster on the link than another;
+    the phase between a reading and its message, and the difference of the messages' times on the link;
     a link that delivers in batches, or stands still, adds nothing, since it holds back all alike. One that is larger
     than `most_s` is not waited for.
     """
@@ -137,7 +139,7 @@ class Lags:
         }
 
     def horizon_s(self, least_s: float, margin_s: float, most_s: float) -> float:
-        """What to wait: the greatest lag and a margin, at least `least_s` and at most `most_s`."""
+        """The time to wait [s]: the greatest lag and a margin, at least `least_s` and at most `most_s`."""
         return min(max(least_s, max(self.by_sensor.values(), default=0.0) + margin_s), most_s)
 
 
@@ -151,7 +153,7 @@ class Refused(NamedTuple):
 
 
 class Serving:
-    """Spells of readings that were heard and not fused, by sensor, on the vehicle's clock."""
+    """Periods in which readings were received and not fused, by sensor, on the vehicle's clock."""
 
     def __init__(self) -> None:
         self._spells: dict[Sensor, Refused] = {}
@@ -167,7 +169,7 @@ class Serving:
         self._spells[sensor] = Refused(before.since_s, max(t_s, before.until_s), before.readings + 1, why)
 
     def judged(self, offered: Iterable[InnovationRow[float]]) -> None:
-        """What became of readings in the navigator."""
+        """Update the periods from the navigator's verdicts on readings."""
         for row in offered:
             sensor, component, reason = Sensor(int(row.sensor)), int(row.component), int(row.reason)
             if sensor == Sensor.LANDED:
@@ -178,7 +180,7 @@ class Serving:
                 self.refused(sensor, row.t_s, Reason(reason).label)
 
     def landed(self, on_ground: bool) -> None:
-        """What the autopilot says of the ground; the navigator may deny it (`judged`)."""
+        """Take the autopilot's landed state; the navigator may contradict it (`judged`)."""
         self._landed = on_ground
         if on_ground and not self._denied:
             for sensor in DOWNWARD:
@@ -190,7 +192,7 @@ class Serving:
         self._landed = self._denied = False
 
     def alarms(self, t_s: float, after_s: float) -> dict[Sensor, Refused]:
-        """Sensors of which nothing was fused for `after_s` although they speak."""
+        """Sensors of which nothing was fused for `after_s` although they send readings."""
         return {
             sensor: spell
             for sensor, spell in self._spells.items()

@@ -1,12 +1,12 @@
-"""Which of a vehicle's inertial sensors flies: one whose accelerometer is stuck gives way before it is believed.
+"""Choice among a vehicle's inertial sensors: one whose accelerometer is stuck is replaced before the navigator uses it.
 
-A stuck accelerometer is known by its content: it jumps, and then says the very same again and again while its gyro does
-not. Readings wait at the horizon for longer than that takes, so that those of the
-stuck one can be taken back, and another's put in their place, before the navigator has seen any.
+A stuck accelerometer is known by its content: it jumps, and then repeats one value while its gyro does not. Readings
+wait at the horizon for longer than that takes, so that those of the stuck one can be taken back, and another's put
+in their place, before the navigator has seen any.
 
-Two that differ and are both alive contradict each other. Of three the one that is alone errs; of two gravity is asked:
-a vehicle that holds its height feels it, on average; the one that does not feel it errs. One that is not believed is no
-witness against another until it has spoken as others do for a while.
+Two that differ and are both alive contradict each other. Of three the one that is alone errs; of two gravity
+decides: a vehicle that holds its height measures it, on average, and the sensor that does not measure it errs. A
+rejected sensor is no witness against another until it has agreed with others for a while.
 """
 
 import math
@@ -26,17 +26,17 @@ STUCK_S = 0.06  # chosen: six readings of a stream of 100 Hz; twelve of ArduPilo
 LEAST_STUCK = 5  # readings alike: chosen
 KEPT_S = 1.0  # of those that do not serve: chosen, more than the horizon and what finds it
 APART_M_S2 = 1.5  # medians that differ by more contradict each other: chosen, beyond two calibrated sensors' biases
-FLICKER_M_S2 = 0.1  # of a stuck one: chosen, ten of the thousandths of g that are told
+FLICKER_M_S2 = 0.1  # of a stuck one: chosen, ten of the thousandths of g in which readings are sent
 SURE = 4.0  # of the difference by chance: chosen
 LOOK_S = 0.1  # of what is compared: chosen
 LEAST_COMPARED, MOST_COMPARED = 3, 50  # readings of it; the most is chosen: 500 Hz, and a flood costs no more than that
 MOST_KEPT = 1024  # readings of a source: chosen, a second of 1 kHz
-BEFORE_S = 0.15  # what was said so shortly before is wrong too: an autopilot smooths what it reads; chosen
+BEFORE_S = 0.15  # readings shortly before that are wrong too: an autopilot smooths its readings; chosen
 RECOVERED_S = 0.3  # since it erred last, where none serves: chosen
 AGREED_S = 1.0  # likewise, where another serves: chosen
-HIGHER_M = 0.4  # a height that says so much more or less than expected, or is refused, is a witness: chosen
-TOGETHER_S = 0.5  # two that say so within this are of one mind: chosen
-DOUBTED_S = 1.0  # for so long after they said it: chosen
+HIGHER_M = 0.4  # a height that is higher or lower than expected by this, or is refused, is a witness: chosen
+TOGETHER_S = 0.5  # two that report so within this agree: chosen
+DOUBTED_S = 1.0  # for this long after they reported it: chosen
 UP = {(Sensor.RANGE, 0): 1.0, (Sensor.BARO, 0): 1.0, (Sensor.GPS_POSITION, 2): -1.0}  # sign of an innovation, up
 
 
@@ -48,8 +48,8 @@ class Sample(NamedTuple):
 
 
 class Usual(NamedTuple):
-    """Medians of what an accelerometer said lately [m/s2], which a jolt that one stream has caught and another has
-    missed does not move, and by how much they differ by chance where it is shaken.
+    """Medians of an accelerometer's recent readings [m/s2], which a jolt that one stream has caught and another has
+    missed does not move, and by how much they differ by chance under vibration.
     """
 
     force: tuple[float, float, float]
@@ -57,7 +57,7 @@ class Usual(NamedTuple):
 
 
 class _Heard:
-    """What one source said lately, and since when its accelerometer says the same."""
+    """The recent readings of one source, and since when its accelerometer has repeated one value."""
 
     def __init__(self) -> None:
         self.kept: deque[Sample] = deque(maxlen=MOST_KEPT)
@@ -102,7 +102,7 @@ class _Heard:
         return self.jumped and self.gyro_moved and self.alike >= LEAST_STUCK and newest_s - self.same_since_s >= STUCK_S
 
     def usual(self, t_s: float) -> Usual | None:
-        """Over the LOOK_S before an instant; None where it has not said enough."""
+        """Medians over the LOOK_S before an instant; None where there are too few readings."""
         lately: list[tuple[float, ...]] = []
         for sample in reversed(self.kept):
             if t_s - sample.t_s > LOOK_S or len(lately) == MOST_COMPARED:
@@ -123,7 +123,7 @@ def _variance(values: tuple[float, ...]) -> float:
 
 
 class Swap(NamedTuple):
-    """A source that must not serve any more, from when on its readings are wrong, and what another said since."""
+    """A source that must no longer be used, since when its readings are wrong, and another's readings since then."""
 
     barred: Source
     since_s: float
@@ -132,7 +132,7 @@ class Swap(NamedTuple):
 
 
 class Inertial:
-    """The inertial sensors of a vehicle, heard beside each other."""
+    """The inertial sensors of a vehicle, compared with each other."""
 
     def __init__(self) -> None:
         self._heard: dict[Source, _Heard] = {}
@@ -163,24 +163,24 @@ class Inertial:
         return None
 
     def _swap(self, serves: Source, since_s: float, why: str, barred: Collection[Source]) -> Swap:
-        """Another in its place: what the first of the others said since."""
+        """The replacement of a source: the readings since `since_s` of the first other source that is alive."""
         alive = self._alive(serves, self._heard[serves].kept[-1].t_s, barred)
         return Swap(
             serves, since_s, why, [sample for sample in alive[0].kept if sample.t_s >= since_s] if alive else []
         )
 
     def recovered(self, source: Source, t_s: float, *, alone: bool) -> bool:
-        """Whether a source that erred speaks as one that does not. alone: none serves, so that nobody contradicts."""
+        """Whether a source that erred agrees with one that does not. alone: none serves, so that none contradicts."""
         heard = self._heard.get(source)
         return heard is not None and t_s - heard.erred_s >= (RECOVERED_S if alone else AGREED_S)
 
     def _alive(self, serves: Source, t_s: float, barred: Collection[Source]) -> list[_Heard]:
-        """Others that speak, are believed and are not stuck."""
+        """Other sources that send readings, are not barred and are not stuck."""
         believed = (heard for source, heard in self._heard.items() if source != serves and source not in barred)
         return [heard for heard in believed if heard.kept and t_s - heard.kept[-1].t_s <= LOOK_S and not heard.stuck]
 
     def _contradicted(self, serves: Source, t_s: float, barred: Collection[Source]) -> bool:
-        """Whether it is alone with what it says, or, of two, feels gravity less than the other."""
+        """Whether the source in use contradicts all others, or, of two, measures gravity less well than the other."""
         alive = self._alive(serves, t_s, barred)
         own = self._heard[serves].usual(t_s) if alive else None
         if own is None:
@@ -196,7 +196,7 @@ class Inertial:
 
 
 def differ(one: Usual | None, other: Usual | None) -> bool:
-    """Whether two accelerometers say what cannot both be."""
+    """Whether two accelerometers differ by more than chance allows."""
     if one is None or other is None:
         return False
     by_chance = math.hypot(one.by_chance, other.by_chance)
@@ -204,10 +204,10 @@ def differ(one: Usual | None, other: Usual | None) -> bool:
 
 
 class Heights:
-    """Range, barometer and GPS held against the height that the inertial sensors carry on.
+    """Compares range, barometer and GPS with the height that the inertial sensors carry on.
 
-    One alone may meet a step of the ground, a gust or a slow error. Two that say so together, and one of them so loudly
-    that the filter refuses it, are right: then neither height nor vertical velocity is sent.
+    One alone may meet a step of the ground, a gust or a slow error. Two that agree, one of them so far off that the
+    filter refuses it, are right: then neither height nor vertical velocity is sent.
     """
 
     def __init__(self) -> None:
@@ -220,7 +220,7 @@ class Heights:
         self._doubted_s = math.nan
 
     def judged(self, rows: Iterable[InnovationRow[float]]) -> None:
-        """What became of readings in the navigator."""
+        """Take the navigator's verdicts on readings."""
         for row in rows:
             sign = UP.get((Sensor(int(row.sensor)), int(row.component)))
             reason = int(row.reason)

@@ -1,8 +1,9 @@
 """Links to a vehicle, none of which ever blocks: addresses, UDP, and frames on their way into a stream of bytes.
 
-Loopback unless told otherwise; `byte_links` has TCP and serial ports. Into a stream of bytes go whole frames only, at
-the line's pace, and no estimate that is old: a line that is full is no reason to wait, and none to send what was true a
-second ago. Of estimates the newest unsent one stands for all before it, and what does not go out is counted.
+Loopback unless an address is given; `byte_links` has TCP and serial ports. Into a stream of bytes go whole frames only,
+at the line's pace, and no estimate that is old: a line that is full is no reason to wait, and none to send an estimate
+that is a second old. Of estimates the newest unsent one replaces all before it, and every frame that is not sent is
+counted.
 """
 
 import os
@@ -50,7 +51,7 @@ class Address(NamedTuple):
 
     @property
     def capacity_bytes_s(self) -> float | None:
-        """What the line carries each way [bytes/s]; None where its address does not tell."""
+        """The line's capacity each way [bytes/s]; None where its address does not give it."""
         return self.number / BITS_A_BYTE if self.over_uart else None
 
 
@@ -92,10 +93,10 @@ def resolved(host: str, port: int) -> tuple[socket.AddressFamily, tuple[Any, ...
 
 
 class Link:
-    """What a session is run over.
+    """The link of a session to its vehicle.
 
     counts: `not_sent`, `replaced`, `unreachable`, `other_sender`, `reconnected`, `overflowed` (datagrams too many).
-    received, written: bytes so far. capacity_bytes_s: what it carries each way; None where that is not known.
+    received, written: bytes so far. capacity_bytes_s: its capacity each way; None where that is not known.
     """
 
     datagrams = False
@@ -110,7 +111,7 @@ class Link:
         raise NotImplementedError
 
     def read(self) -> list[Piece]:
-        """What has arrived, without waiting."""
+        """Pieces that have arrived, without waiting."""
         raise NotImplementedError
 
     def overheard(self) -> list[bytes]:
@@ -125,10 +126,10 @@ class Link:
         """Let go."""
 
     def believe(self, sender: Sender) -> None:
-        """The vehicle spoke from there: it is answered there, and nobody else is listened to."""
+        """Accept `sender` as the vehicle: answers go there, and no other sender is accepted."""
 
     def forget(self) -> None:
-        """The vehicle is silent: anyone may speak."""
+        """Accept any sender again: the vehicle is silent."""
 
 
 def waited(link: Link, seconds: float) -> None:
@@ -240,9 +241,10 @@ def message_id_of(frame: bytes) -> int:
 
 
 class Outgoing:
-    """What waits to be written. counts: `replaced`, estimates that a newer one stood for; `not_sent`, other frames.
+    """Frames that wait to be written. counts: `replaced`, estimates that a newer one replaced; `not_sent`, other
+    frames.
 
-    pace_bytes_s: what the line carries; None where it takes what it is given.
+    pace_bytes_s: the line's capacity; None where it is not limited.
     """
 
     def __init__(self, counts: Counter[str], pace_bytes_s: float | None = None) -> None:
@@ -271,7 +273,9 @@ class Outgoing:
             self._others.append(frame)
 
     def flush(self, write: Callable[[bytes], int], now_s: float) -> int:
-        """Write what the pace and the port allow; write says how many bytes it took. How many went out."""
+        """Write as many frames as pace and port allow; write: returns how many bytes it took. Returns the number of
+        frames sent.
+        """
         self._earn(now_s)
         written = 0
         while self._rest or (self._credit > 0.0 and self._next()):

@@ -33,7 +33,7 @@ PRIORITY = 1  # the least of the real-time ones: before every ordinary process, 
 NICE = -10
 SWITCH_S = 0.0005  # a tenth of Python's own: chosen, beside a journal's and a screen's threads
 WAIT_S = 0.005  # chosen: what arrives wakes it sooner (0.7 ms to the estimate in the median, live.md)
-SILENT_S = 3.0  # after so long without the vehicle anyone may speak on a UDP port: chosen, three HEARTBEATs
+SILENT_S = 3.0  # after this long without the vehicle any sender on a UDP port is accepted: chosen, three HEARTBEATs
 SCREEN_S = 0.25  # chosen, for readers
 COLLECT_S = 0.1  # chosen: garbage is collected after an estimate, not where Python would
 NAN = float("nan")
@@ -59,7 +59,7 @@ def run_before_others() -> str:
 
 
 def run_as_others() -> None:
-    """What follows the flight must not hold up the rest of the machine."""
+    """Run this thread at normal priority, so that work after the flight does not hold up the rest of the machine."""
     with suppress(OSError):
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
@@ -141,7 +141,7 @@ class Collector:
 def stoppable() -> Iterator[Callable[[], bool]]:
     """Whether Ctrl-C, a termination or the terminal's end was asked for; a second one breaks off at once.
 
-    But for a terminal that ends, which may say so twice.
+    Except the terminal's end, which may be signalled twice.
     """
     asked: list[int] = []
     handled = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -167,7 +167,7 @@ def run_session(
     shows: Iterable[Callable[[float], None]] = (),
     clock: Callable[[], float] = time.monotonic,
 ) -> None:
-    """Until `stop`: what arrives goes in as it arrives, what the session says goes out.
+    """Run until `stop`: pass on bytes as they arrive, and send the session's frames.
 
     shows: called with our clock four times a second, between two readings; none of them may wait for anything.
     """
@@ -189,7 +189,7 @@ def run_session(
     with Collector(spoke_s) as collector:
         while not stop():
             waited(link, WAIT_S)
-            if session.turns > turns:  # the vehicle is another one, which may speak from elsewhere
+            if session.turns > turns:  # the vehicle is another one, which may send from elsewhere
                 turns = session.turns
                 link.forget()
             for piece, sender in link.read():
@@ -221,7 +221,7 @@ def run_vehicle(
     stop: Callable[[], bool],
     clock: Callable[[], float] = time.monotonic,
 ) -> float:
-    """Tell the flight at `speed` times its pace until it ends or `stop`; the time of the flight that was reached [s].
+    """Send the flight at `speed` times its pace until it ends or `stop`; the time of the flight that was reached [s].
 
     Stamps are of the flight, so that at another speed than 1 the vehicle's clock runs faster than ours.
     """

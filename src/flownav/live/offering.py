@@ -1,4 +1,4 @@
-"""What of the estimate of now may be sent: alarms of sensors that do not serve, limits, and what contradicts it."""
+"""Decides whether the current estimate may be sent: alarms of unused sensors, limits, and contradictions."""
 
 from flownav.core.frames import Vector
 from flownav.core.measurement import Sensor
@@ -15,9 +15,9 @@ from flownav.logs.mavlink.outgoing import Estimate
 from flownav.navigation.loop import Running
 from flownav.navigation.reasons import HORIZONTAL
 
-RECENT_S = 1.0  # a range and a landed state that are older do not say where a navigator begins: chosen
+RECENT_S = 1.0  # an older range or landed state does not determine where a navigator begins: chosen
 HEIGHT_DOUBTED = "height_doubted"
-# What a sensor that does not serve may cause.
+# Reasons that an unused sensor may cause.
 OUTRANKED = ("", "position_invalid", "dead_reckoning", "flow_doubted", "unprotected")
 NAN = float("nan")
 
@@ -25,8 +25,8 @@ NAN = float("nan")
 class Offering:
     """Judges the estimate before it is sent.
 
-    alarms: sensors that are heard and not fused, since when and why; past_alarms: the longest of each sensor; settled:
-    an estimate was there to be sent, so that the vehicle is the vehicle.
+    alarms: sensors that are received and not fused, since when and why; past_alarms: the longest of each sensor;
+    settled: an estimate was there to be sent, so that the vehicle is the vehicle.
     """
 
     def __init__(self, limits: Limits, keeper: Keeper, hearing: Hearing, filtering: Filtering) -> None:
@@ -40,10 +40,10 @@ class Offering:
 
     @property
     def offset_ned_m(self) -> Vector:
-        """Of the navigator's origin in the frame that is sent [m].
+        """The navigator's origin in the frame that is sent [m].
 
-        One that begins in flight without GPS begins at 0, and is above the ground by what the range says: what is sent
-        is about the ground below, until an origin and a fix say more.
+        One that begins in flight without GPS begins at 0, and its height above the ground is the range: the sent
+        position is relative to the ground below, until an origin and a fix arrive.
         """
         north_m, east_m, down_m = self.hearing.origin.offset_ned_m
         unknown = not (north_m or east_m or down_m)
@@ -88,8 +88,9 @@ class Offering:
         self.alarms = found
 
     def _spoils(self, sensor: Sensor, t_s: float) -> bool:
-        """Whether a sensor that does not serve keeps the estimate from being sent: any that tells where the vehicle is,
-        but a GPS that is refused while the flow, which nobody doubts, agrees with the inertial sensors."""
+        """Whether a sensor that does not serve keeps the estimate from being sent: any that gives the position,
+        except a GPS that is refused while the flow, which nobody doubts, agrees with the inertial sensors.
+        """
         refused = self.alarms[sensor].why == Reason.INNOVATION_GATE.label
         return sensor in HORIZONTAL and not (sensor in GPS and refused and self.anchor.agrees(t_s))
 
@@ -117,7 +118,7 @@ class Offering:
         return reason, estimate if not reason or reason in PLACES else None
 
     def say_origin(self, event: str, t_s: float) -> None:
-        """What became of an origin goes into the record."""
+        """Record what happened to the autopilot's origin."""
         origin = self.hearing.origin
         if event == "moved":
             offset_m = sum(value**2 for value in origin.offset_ned_m) ** 0.5

@@ -1,4 +1,4 @@
-"""What a live session is asked to do, and the limits within which it sends."""
+"""The options of a live session, and the limits within which it sends."""
 
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -17,10 +17,10 @@ class Limits:
     """Beyond any of these no estimate is sent.
 
     age_s: of the newest reading of the vehicle. dead_reckoning_s: of the newest horizontal aid that was fused, the
-    horizon's wait included; a vehicle that flies on the estimate moves on what it says, so this is short. sigma_m,
-    sigma_m_s: one standard deviation of horizontal position and velocity. protection_m: how far off the position may be
-    although no fault is noticed, the horizontal protection level. sigma_down_m: one of the height. unfused_s: for how
-    long a horizontal sensor may speak without being fused.
+    horizon's wait included; a vehicle that uses the estimate follows its errors, so this is short. sigma_m,
+    sigma_m_s: one standard deviation of horizontal position and velocity. protection_m: how far off the position may
+    be although no fault is noticed, the horizontal protection level. sigma_down_m: one of the height. unfused_s: for
+    how long readings of a horizontal sensor may arrive without being fused.
     """
 
     age_s: float = 0.3
@@ -34,13 +34,14 @@ class Limits:
 
 @dataclass(frozen=True)
 class Options:
-    """What a session is asked to do.
+    """The options of a session.
 
-    accept: who beside the autopilot may tell which message. key: a MAVLink signing key. identified: a flow sensor's
-    latency and axes; its gains are the settings'. margin_s: what the horizon waits beyond the largest delay that is
-    stated: an IMU period and jitter. most_horizon_s: the longest that it waits for any stream. listen_s: how long the
-    vehicle is listened to before it is decided which sensors serve. restart_s: a longer silence of the vehicle, or its
-    reboot, begins the navigation anew. capacity_bytes_s: what the link carries each way; None: more than is asked for.
+    accept: which senders other than the autopilot may send which message. key: a MAVLink signing key. identified: a
+    flow sensor's latency and axes; its gains are the settings'. margin_s: the time that the horizon waits beyond the
+    largest delay that is stated: an IMU period and jitter. most_horizon_s: the longest that it waits for any stream.
+    listen_s: how long the vehicle is listened to before it is decided which sensors serve. restart_s: a longer silence
+    of the vehicle, or its reboot, begins the navigation anew. capacity_bytes_s: the link's capacity each way; None:
+    more than is asked for.
     """
 
     send: Sending = "odometry"

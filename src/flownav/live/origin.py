@@ -18,9 +18,10 @@ LEAST_MOVE_M = 0.01  # the tick of a latitude of 1e-7 deg
 class Origin:
     """The origin of the navigator's frame, and where that lies in the autopilot's.
 
-    The navigator's is what the autopilot told before the first fix, else the first fix; positions that it was fed are
-    about it, so it stays. An autopilot that sets its own later, or another, moves what is sent by the difference, which
-    is a jump of the estimate (`moves` counts them). One that no vehicle of this place can have is refused (`refused`).
+    The navigator's is the origin that the autopilot sent before the first fix, else the first fix; positions that it
+    was fed are about it, so it stays. An autopilot that sets its own later, or another, moves what is sent by the
+    difference, which is a jump of the estimate (`moves` counts them). One that no vehicle of this place can have is
+    refused (`refused`).
 
     One message is one witness: an origin far from the first fix, or another one once an estimate was sent, is doubted
     (`doubted`). The autopilot's own position (LOCAL_POSITION_NED) is about its origin, so that with it and the fixes
@@ -38,7 +39,7 @@ class Origin:
 
     @property
     def about_deg_m(self) -> Geodetic | None:
-        """Where on earth the vehicle is, as far as anybody said."""
+        """The geodetic place of the navigator's origin, else the one that the autopilot sent; None without either."""
         return self.navigator_deg_m or self._told
 
     def told(self, place: Geodetic, *, settled: bool = False) -> str:
@@ -56,8 +57,8 @@ class Origin:
         return self._laid(place)
 
     def fixed(self, place: Geodetic, here_ned_m: Vector | None = None) -> str:
-        """A GPS fix: "", `moved`, `doubted` or `refused`. The first one judges what was told before it, and is the
-        origin where nothing that can be was.
+        """A GPS fix: "", `moved`, `doubted` or `refused`. The first one checks the origin that was received before it,
+        and is the origin where none that is possible was received.
 
         here_ned_m: where a navigator that began without GPS is by now; the fix is there, and the origin behind it.
         """
@@ -79,7 +80,7 @@ class Origin:
         return "doubted" if known else "refused"
 
     def _is_doubtful(self, place: Geodetic, *, settled: bool) -> bool:
-        """Whether somebody else has to say the same before it is believed."""
+        """Whether another witness has to confirm the origin before it is used."""
         used = self._told or self.navigator_deg_m
         if self.navigator_deg_m is None or used is None:
             return False
@@ -104,7 +105,7 @@ class Origin:
         return self._laid(place)
 
     def as_facts(self) -> dict[str, Any]:
-        """What is told of it as JSON."""
+        """The origin as a JSON object."""
         facts = {"offset_ned_m": list(self.offset_ned_m), "moves": self.moves, "refused": self.refused}
         return facts | {"doubted": list(self.doubted) if self.doubted else None}
 

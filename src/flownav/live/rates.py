@@ -1,9 +1,9 @@
-"""Which rates a link can carry: what the vehicle is asked for, and how often it is sent an estimate.
+"""The rates that a link can carry: of the requested streams, and of the estimates that are sent.
 
-A line that is asked for more than it carries does not say so: the autopilot's buffer fills, readings arrive later and
-later, and what does not fit is lost at random. So rates come down in the stated order until they fit, what the
-navigator rests on last: inertial readings, flow, range and GPS. A serial line carries a tenth of its baud rate in
-bytes.
+A line that is asked for more than it carries gives no error: the autopilot's buffer fills, readings arrive later and
+later, and frames that do not fit are lost at random. So rates come down in the stated order until they fit, those of
+the navigator's main sensors last: inertial readings, flow, range and GPS. A serial line carries a tenth of its baud
+rate in bytes.
 """
 
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from flownav.logs.mavlink.framing import ARDUPILOT, PX4
 ARDUPILOT_MOST_HZ = 1.0 / 0.021
 PX4_LEAST_HZ = 30.0  # of estimates; EKF2 does not fuse fewer (docs/en/ros/external_position_estimation.md)
 # message: id and rate [Hz]; the IMU moves the state, the others correct it
-# Other inertial sensors are heard beside the one that serves (live/inertial.py); a vehicle without them says nothing.
+# Other inertial sensors are compared with the one in use (live/inertial.py); a vehicle without them sends none.
 OTHER_IMU = {"SCALED_IMU2": (116, 50), "SCALED_IMU3": (129, 50)}
 COMMON = {
     "ATTITUDE_QUATERNION": (31, 50),
@@ -27,7 +27,7 @@ COMMON = {
 }
 STREAMS = {
     True: {"RAW_IMU": (27, 100), "OPTICAL_FLOW": (100, 50), **OTHER_IMU, **COMMON},  # ArduPilot
-    # PX4 says nowhere that it is simulated, and a vehicle has no truth to tell
+    # PX4 has no parameter that shows a simulator, and a vehicle has no truth to send
     False: {
         "SCALED_IMU": (26, 100),
         "HIGHRES_IMU": (105, 100),
@@ -86,9 +86,9 @@ Streams = dict[str, tuple[int, float]]  # by message: its number and its rate [H
 
 
 class Plan(NamedTuple):
-    """What a link can carry. bytes_s: what the streams take; estimate_hz: infinite where nothing limits it.
+    """The rates that a link can carry. bytes_s: what the streams take; estimate_hz: infinite where nothing limits it.
 
-    lacks: what it is too slow for, in words; "" where it carries the least that is needed.
+    lacks: the needs that it is too slow for, in words; "" where it carries the minimum.
     """
 
     streams: Streams
@@ -98,7 +98,7 @@ class Plan(NamedTuple):
 
 
 def bytes_of(streams: Streams, *, ardupilot: bool, signed: bool = False) -> float:
-    """What streams take of a line [bytes/s]."""
+    """The capacity that streams take of a line [bytes/s]."""
     extra = SIGNATURE_BYTES if signed else 0
     return sum(
         rate_hz * (FRAME_BYTES.get(name, 0) + extra)
@@ -181,7 +181,7 @@ class Rates:
     def heard(self, size: int, now_s: float, *, settled: bool = True) -> bool:
         """Note bytes that arrived. True where the line has been overfull: the streams are to be asked for anew, lower.
 
-        settled: the vehicle has been asked for all that is planned; before, what arrives says nothing of the plan.
+        settled: the vehicle has been asked for all planned streams; before, arriving bytes do not test the plan.
         """
         if self.capacity_bytes_s is None:
             return False

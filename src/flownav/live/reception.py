@@ -24,14 +24,16 @@ class Vehicle(NamedTuple):
 
 
 class Accepted(NamedTuple):
-    """Who beside the autopilot may tell a message: a system (None: the vehicle's) and a component of it (None: any)."""
+    """A sender other than the autopilot that may send a message: a system (None: the vehicle's) and a component of
+    it (None: any).
+    """
 
     message: str
     system: int | None = None
     component: int | None = None
 
 
-# sensors that companions and gimbals of the vehicle's own system tell: a camera, a flow sensor, a range finder
+# sensors that companions and gimbals of the vehicle's own system send: a camera, a flow sensor, a range finder
 BESIDE = tuple(map(Accepted, ("LANDING_TARGET", "OPTICAL_FLOW", "OPTICAL_FLOW_RAD", "DISTANCE_SENSOR")))
 
 
@@ -46,21 +48,22 @@ def accepted_of(text: str) -> Accepted:
 
 
 def accepted_by(texts: Iterable[str]) -> tuple[Accepted, ...]:
-    """What is accepted beside the autopilot: `accepted_of` each, in place of BESIDE for the messages that they name."""
+    """The senders accepted next to the autopilot: `accepted_of` each text, in place of BESIDE for the messages they
+    name.
+    """
     stated = tuple(map(accepted_of, texts))
     named = {entry.message for entry in stated}
     return (*stated, *(entry for entry in BESIDE if entry.message not in named))
 
 
 class Reception:
-    """Bytes in, messages of the vehicle out, and those that `accept` lets others tell.
+    """Bytes in, messages of the vehicle out, and those that `accept` allows of other senders.
 
-    The vehicle is the first autopilot whose HEARTBEAT is heard, of the system and component that were asked for
-    (None: any), until a better one is taken (autopilots). What flownav itself sends (`own`) and another component of
-    the vehicle's system repeats is not taken.
-    counts: by reason, what was not listened to (`other_system`, `unsigned`, `bad_signature`, `replayed`,
-    `bad_checksum`, `truncated`, `skipped_bytes`, `unknown_message`, `undecodable`, `before_heartbeat`), and `lost`, the
-    vehicle's frames that never came, by its sequence numbers.
+    The vehicle is the first autopilot whose HEARTBEAT is received, of the system and component that were asked for
+    (None: any), until a better one is taken (autopilots). flownav's own messages (`own`) that another component of the
+    vehicle's system repeats are not taken. counts: the messages that were not taken, by reason (`other_system`,
+    `unsigned`, `bad_signature`, `replayed`, `bad_checksum`, `truncated`, `skipped_bytes`, `unknown_message`,
+    `undecodable`, `before_heartbeat`), and `lost`, the vehicle's frames that never came, by its sequence numbers.
     """
 
     def __init__(
@@ -91,13 +94,13 @@ class Reception:
 
     @property
     def counts(self) -> Counter[str]:
-        """What was not listened to, by reason."""
+        """Number of messages that were not taken, by reason."""
         rejected = self._check.rejected if self._check else Counter[str]()
         return Counter({k: n for k, n in (self._counts + self._frames.damage + rejected).items() if n})
 
     @property
     def others(self) -> list[tuple[int, int]]:
-        """Other autopilots that were heard: system and component."""
+        """Other autopilots that were received: system and component."""
         return sorted(self._others)
 
     def feed(self, piece: bytes, *, whole: bool) -> Iterator[Message]:
@@ -149,7 +152,7 @@ class Reception:
             self._others.add(who)
 
     def overhear(self, piece: bytes) -> None:
-        """A datagram of another address than the vehicle's: another autopilot may speak there."""
+        """Take note of a datagram from another address than the vehicle's: another autopilot may send there."""
         for frame, content in StreamFrames().feed(piece, whole=True):
             who = frame.system, frame.component
             wanted = all(wanted in (None, own) for wanted, own in zip(self._wanted, who, strict=True))
@@ -178,11 +181,11 @@ class Reception:
         self.vehicle, self._sequence = vehicle, None
 
     def is_of_vehicle(self, message: Message) -> bool:
-        """Whether the autopilot itself told it."""
+        """Whether the autopilot itself sent the message."""
         return self.vehicle is not None and sender_of(message) == self.vehicle[:2]
 
     def _accepts(self, message_id: int, who: tuple[int, int]) -> bool:
-        """Whether a component that is not the vehicle's autopilot may tell a message."""
+        """Whether a component that is not the vehicle's autopilot may send a message."""
         assert self.vehicle is not None
         if who == (self.vehicle.system, self._own):
             return False

@@ -1,4 +1,4 @@
-"""What a session leaves behind: everything the navigator was fed, as it was fed, and what it made of it.
+"""The recording of a session: every reading the navigator was fed, as it was fed, and its outputs.
 
 While the session runs all of it goes to a journal beside the record (`logs/journal.py`), written by a thread of its
 own; `finish` makes the Record of the journal, and then removes that. A session that was killed leaves the journal, of
@@ -31,7 +31,7 @@ FACTS_S = 1.0  # chosen: a killed session loses its last second
 
 
 class Finished(NamedTuple):
-    """What a recording came to: the record and the journal that remain, None where they do not.
+    """The result of a recording: the record and the journal that remain, None where they do not.
 
     reason: why the record is not whole, or not there; "" where all is well.
     """
@@ -41,7 +41,7 @@ class Finished(NamedTuple):
     reason: str
 
     def facts(self) -> dict[str, Any]:
-        """What `--json` says of it."""
+        """The recording's fields of the `--json` output."""
         return {
             "record": str(self.record) if self.record else None,
             "journal": str(self.journal) if self.journal else None,
@@ -49,7 +49,7 @@ class Finished(NamedTuple):
         }
 
     def verdict(self) -> str:
-        """What a user must know where there is a reason."""
+        """The sentence that tells the user why the record is not whole."""
         if self.record is not None:
             return f"{self.record}: recorded in part only ({self.reason}); it holds what came before"
         return (
@@ -93,11 +93,11 @@ class Recorder(Keeper):
         self._segments += 1
 
     def fed(self, queue: EventQueue, arrival_s: Array) -> None:
-        """A batch; it is kept together with what comes of it."""
+        """Keep a batch, to be written together with its results."""
         self._fed = fed_rows(queue, arrival_s, self._segments - 1)
 
     def written(self, estimate: Array, innovation: Array, event: Array) -> None:
-        """What came of it."""
+        """Write the batch with its estimates, innovations and events."""
         rows = {"fed": self._fed, "estimate": estimate, "innovation": innovation, "event": event}
         self._writer.take({name: values for name, values in rows.items() if values is not None and len(values)})
         self._fed = None
@@ -126,7 +126,7 @@ class Recorder(Keeper):
     def finish(self, facts: dict[str, Any], *, heard: bool = True) -> Finished:
         """Make the record, whole, and then remove the journal. `facts`: the session's own figures.
 
-        heard: a vehicle was heard; without one there is nothing to keep, and no record is made.
+        heard: a vehicle was received; without one there is nothing to keep, and no record is made.
         """
         if self._fed is not None:
             self._writer.take({"fed": self._fed})
@@ -169,7 +169,7 @@ class Recorder(Keeper):
 
 
 def told_every_second(recorder: Recorder, facts: Callable[[], dict[str, Any]]) -> Callable[[float], None]:
-    """What the loop calls with our clock: a killed session's record has the figures of its last second."""
+    """A function called by the loop with our clock: writes the facts once a second, in case the session is killed."""
     at_s = [float("-inf")]
 
     def tell(now_s: float) -> None:
@@ -191,7 +191,7 @@ def forced_to_disk(path: Path) -> None:
 
 
 def _head(options: Options) -> dict[str, Any]:
-    """What the first block says: all that is known before anything is heard."""
+    """The first block of the journal: all that is known before the first message."""
     return {
         "journal": 1,
         "columns": WIDTHS,

@@ -20,7 +20,7 @@ Value = TypeVar("Value")
 
 
 class TruthRow(NamedTuple, Generic[Value]):
-    """What a simulator said of the truth, as a journal keeps it; place: latitude, longitude [deg], altitude [m]."""
+    """A simulator's true state, as a journal keeps it; place: latitude, longitude [deg], altitude [m]."""
 
     t_s: Value
     place_deg_m: Annotated[Value, 3]
@@ -43,7 +43,8 @@ WIDTHS = {
 
 
 class Recovered(NamedTuple):
-    """What a journal held. ended: its session came to its end; torn_bytes: at its end, of a block that is not whole.
+    """The content of a journal. ended: its session came to its end; torn_bytes: at its end, of a block that is not
+    whole.
 
     blocks: whole ones; lost_bytes, lost_blocks: in its middle; unclaimed: rows fed to a navigator of which nothing is
     known, which are left out.
@@ -59,7 +60,7 @@ class Recovered(NamedTuple):
 
 
 class _Story(NamedTuple):
-    """A journal read: what its blocks say, in order, and their rows."""
+    """The content of a journal: its blocks' entries, in order, and their rows."""
 
     head: dict[str, Any]
     segments: dict[int, dict[str, Any]]
@@ -94,7 +95,7 @@ def recovered(journal: Path) -> Recovered:
         _fill(found.record, story, found)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
         raise InputError(
-            f"{journal}: its blocks do not say what a session says ({error}); nothing can be made of it"
+            f"{journal}: its blocks are not those of a session ({error}); nothing can be made of it"
         ) from error
     return found
 
@@ -111,7 +112,7 @@ def _read(journal: Path) -> tuple[list[Block], list[Damage]]:
     found = list(blocks(data))
     whole = [part for part in found if isinstance(part, Block)]
     if not any("head" in part.said for part in whole):
-        raise InputError(f"{journal}: no whole block says with which settings it flew; nothing can be made of it")
+        raise InputError(f"{journal}: no whole block holds the settings of its navigator; nothing can be made of it")
     return whole, [part for part in found if isinstance(part, Damage)]
 
 

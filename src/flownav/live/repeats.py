@@ -1,7 +1,7 @@
-"""What a stream tells again: ArduPilot sends a flow of 10 Hz at 50, a fix of 5 Hz at 10, stamped anew each time.
+"""Readings that a stream repeats: ArduPilot sends a flow of 10 Hz at 50, a fix of 5 Hz at 10, stamped anew each time.
 
 A copy that is taken for a reading makes five of one, and its exposure a fifth. Copies are known by their content: the
-same as before, sooner than this source usually has something new to say. A reading that reads the same as the last, as
+same as before, sooner than this source usually has a new reading. A reading that reads the same as the last, as
 on the ground, comes when it is time for one. Inertial readings are samples of what goes on, and a copy is a sample too.
 """
 
@@ -14,7 +14,7 @@ from flownav.core.measurement import Sensor
 from flownav.live.horizon import Source
 from flownav.logs.mavlink.framing import Message
 
-# Of which sensor a message tells, and what it says beside the time of sending; a time of measuring is content.
+# The sensor of each message, and its fields except the time of sending; a time of measuring is content.
 # ArduPilot's OPTICAL_FLOW has its filter's height in ground_distance, which is new in every copy.
 CONTENT: dict[str, tuple[Sensor, tuple[str, ...]]] = {
     "OPTICAL_FLOW": (Sensor.FLOW_RATE, ("flow_rate_x", "flow_rate_y", "flow_comp_m_x", "flow_comp_m_y", "quality")),
@@ -26,7 +26,7 @@ CONTENT: dict[str, tuple[Sensor, tuple[str, ...]]] = {
     "ATTITUDE_QUATERNION": (Sensor.ATTITUDE, ("q1", "q2", "q3", "q4")),
     "ATTITUDE": (Sensor.ATTITUDE, ("roll", "pitch", "yaw")),
 }
-KEPT = 9  # times from one content to the next of which the usual is told: chosen, odd
+KEPT = 9  # times from one content to the next of which the median is taken: chosen, odd
 LEAST_KEPT = 3  # chosen
 CROWDED_S = 0.0005  # chosen: MAVLink's inertial streams reach 1 kHz; 20 000 a second were more than is fused in time
 EARLY = 0.9  # of the usual time; a stream's own step shifts what is new by a tenth
@@ -35,7 +35,7 @@ NAN = float("nan")
 
 
 class _Told(NamedTuple):
-    """What a source told last, since when, when it was taken last, and the times from one content to the next [s]."""
+    """A source's last content, since when, when it was last taken, and the times between contents [s]."""
 
     content: tuple[float, ...]
     since_s: float
@@ -44,7 +44,7 @@ class _Told(NamedTuple):
 
 
 class Repeats:
-    """Whether a message tells what was told before, by its source."""
+    """Finds messages that repeat the last content of their source."""
 
     def __init__(self) -> None:
         self._told: dict[Source, _Told] = {}

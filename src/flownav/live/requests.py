@@ -1,8 +1,8 @@
-"""What a vehicle is asked for: each stream at its rate, one command at a time, and a simulator for the truth.
+"""Requests to a vehicle: each stream at its rate, one command at a time, and a simulator's truth.
 
 ArduPilot's simulator has parameters that no vehicle has (SIM_SPEEDUP), so it is asked for one; a vehicle answers
-nothing, or that there is none. PX4's says so in its HEARTBEAT (MAV_MODE_FLAG_HIL_ENABLED). Who tells the truth unasked
-is one. A vehicle is not asked for a truth that it does not have: ArduPilot would complain to every ground station.
+nothing, or that there is none. PX4's sets MAV_MODE_FLAG_HIL_ENABLED in its HEARTBEAT. A sender of unrequested truth is
+one. A vehicle is not asked for a truth that it does not have: ArduPilot would complain to every ground station.
 """
 
 from collections import Counter
@@ -21,14 +21,14 @@ ACCEPTED, TEMPORARILY_REJECTED, IN_PROGRESS = 0, 1, 5  # MAV_RESULT
 # test_live_recordings).
 ANSWER_S = 0.5
 TRIES = 3
-SILENT_S = 2.0  # a stream that has said nothing for so long is asked for again
-SILENT_PERIODS = 5.0  # and for so many of its periods
+SILENT_S = 2.0  # a stream without a message for this long is requested again
+SILENT_PERIODS = 5.0  # and for this number of its periods
 MOST_PATIENCE_S = 30.0  # a stream that has never come is asked for ever more seldom, down to this
-ORIGIN, GLOBAL_ORIGIN = "GPS_GLOBAL_ORIGIN", 49  # told when it is asked for, and when it is set
+ORIGIN, GLOBAL_ORIGIN = "GPS_GLOBAL_ORIGIN", 49  # sent when it is requested, and when it is set
 
 
 class Truth(NamedTuple):
-    """The message that tells the truth: its name, number and the rate to ask for [Hz]."""
+    """The message with the truth: its name, number and the rate to ask for [Hz]."""
 
     name: str
     number: int
@@ -41,7 +41,7 @@ TRUTHS = {truth.name: truth for truth in (SIM_STATE, HIL_STATE)}
 
 
 class Simulator:
-    """What is known of the vehicle being one. truth: what to ask it for; None while it is taken for a vehicle."""
+    """Whether the vehicle is a simulator. truth: the message to request; None while it is taken for a vehicle."""
 
     def __init__(self) -> None:
         self.truth: Truth | None = None
@@ -49,7 +49,7 @@ class Simulator:
         self._asked_s = float("-inf")
 
     def heard(self, message: Message, vehicle: Vehicle) -> Truth | None:
-        """The truth to ask for, where this message of the autopilot is the first to tell of a simulator."""
+        """The truth to ask for, where this message of the autopilot is the first sign of a simulator."""
         if self.truth is not None:
             return None
         name = message.msgname
@@ -84,8 +84,8 @@ class _Stream(NamedTuple):
 class Requests:
     """Commands to a vehicle, one after the other. answers counts them: `accepted`, `refused`, `unanswered`.
 
-    A stream that falls silent while the vehicle speaks is asked for again: after a reboot all rates are 0. One that was
-    refused is not, except the origin, which an autopilot has none of before its first fix.
+    A stream that falls silent while the vehicle sends others is requested again: after a reboot all rates are 0. One
+    that was refused is not, except the origin, which an autopilot has none of before its first fix.
     """
 
     def __init__(self, rates: Rates) -> None:

@@ -113,7 +113,7 @@ class Screen:
         self._rates: dict[Sensor, float] = {}
 
     def view(self, now_s: float) -> View:
-        """What is to be shown at an instant of our clock."""
+        """The screen's content at an instant of our clock."""
         session = self._session
         self._follow(now_s)
         dropped = ", ".join(f"{name} {count}" for name, count in sorted(session.dropped.items())) or "nothing"
@@ -157,17 +157,17 @@ class Screen:
         return f"{self._url}  {who}  {state}"
 
     def _alarms(self) -> list[str]:
-        """What rests on less than it should: sensors that are heard and not fused, a record that is not written."""
+        """Alarms: sensors that are received and not fused, and a record that is not written."""
         reason = self._recorder.reason if self._recorder is not None else ""
         unfused = [
-            f"ALARM: {sensor.name.lower()} is heard and has not been fused for "
+            f"ALARM: {sensor.name.lower()} is received and has not been fused for "
             f"{spell.until_s - spell.since_s:.0f} s ({spell.why})"
             for sensor, spell in sorted(self._session.alarms.items())
         ]
         return [*unfused, *([f"NOT RECORDING: {reason}"] if reason else [])]
 
     def _running(self) -> str:
-        """What is kept of the session, and how its process is scheduled."""
+        """The line about the recording, and about the scheduling of the process."""
         recorder = self._recorder
         kept = "not asked for" if recorder is None else f"{recorder.path}, {1e-6 * recorder.size:.1f} MB"
         return f"recording: {kept}" + (f"; scheduling: {self._scheduling}" if self._scheduling else "")

@@ -2,7 +2,7 @@
 
 Bytes become messages of one vehicle (reception), these become measurements on the vehicle's clock (hearing), which wait
 on rings until all of their instant must be here, and are then fed to the navigator (filtering). Its state,
-carried on to now, is sent where nothing speaks against it (answers).
+carried on to now, is sent where no limit is exceeded (answers).
 """
 
 from collections import Counter, deque
@@ -63,7 +63,7 @@ class Session:
         self.outbox: deque[bytes] = deque(maxlen=1024)
         self.innovations: dict[tuple[int, int], tuple[float, float, int]] = {}  # innovation, test ratio, reason
         self._origin_kept: tuple[float, float, float] | None = None
-        self._vehicle_s = NAN  # our clock when the vehicle last spoke
+        self._vehicle_s = NAN  # our clock at the vehicle's last message
         self._sent_s = self._second_s = float("-inf")
 
     @property
@@ -80,7 +80,7 @@ class Session:
 
     @property
     def alarms(self) -> dict[Sensor, Refused]:
-        """Sensors that are heard and not fused, since when and why."""
+        """Sensors that are received and not fused, since when and why."""
         return self.offering.alarms
 
     @property
@@ -95,7 +95,7 @@ class Session:
 
     # -- what arrives -----------------------------------------------------------------------------------------
     def take(self, piece: bytes, now_s: float, *, whole: bool) -> bool:
-        """What arrived at `now_s`; True where the vehicle spoke in it. `tick` does the rest."""
+        """Take bytes that arrived at `now_s`; True where the vehicle sent one of them. `tick` does the rest."""
         before = self.reception.received
         for message in self.reception.feed(piece, whole=whole):
             vehicle = self.reception.vehicle
@@ -134,7 +134,7 @@ class Session:
             self.reception.overhear(piece)
 
     def _choose(self, now_s: float) -> None:
-        """Before anything was sent, a better autopilot takes the place of the one that was heard first."""
+        """Before anything was sent, replace the autopilot that was received first by a better one."""
         better, before = self.reception.better(now_s), self.reception.vehicle
         if better is None or before is None or self.clock is None:
             return
@@ -160,7 +160,7 @@ class Session:
         self.keeper.note(t_s, "link", "restart", why, value)
 
     def _told(self, message: Message, clock: VehicleClock, vehicle: Vehicle, now_s: float) -> None:
-        """What the autopilot says that is no measurement."""
+        """Take messages of the autopilot that are no measurements."""
         name = message.msgname
         truth = self.simulator.heard(message, vehicle)
         if truth is not None:
@@ -271,7 +271,7 @@ class Session:
         return outcome.readings == BATCH_READINGS
 
     def _offer(self, t_s: float, now_s: float) -> None:
-        """Send the estimate of now, or what of it may be sent, or say why not."""
+        """Send the estimate of now, or its permitted part, or note why not."""
         vehicle = self.reception.vehicle
         assert vehicle is not None
         assert self.clock is not None

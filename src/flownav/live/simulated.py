@@ -1,7 +1,7 @@
-"""The other end of a link: a flight that was simulated, told as the vehicle's autopilot would tell it, in real time.
+"""The other end of a link: a simulated flight, sent in real time as the vehicle's autopilot would send it.
 
-What its own sensors read goes out when it arrived, and the attitude that its autopilot flew on; it answers TIMESYNC and
-MAV_CMD_SET_MESSAGE_INTERVAL, and tells the truth (SIM_STATE), so that what comes back can be judged.
+Its sensor readings go out when they arrived, and the attitude that its autopilot used; it answers TIMESYNC and
+MAV_CMD_SET_MESSAGE_INTERVAL, and sends the truth (SIM_STATE), so that the returned estimate can be judged.
 """
 
 import heapq
@@ -32,7 +32,7 @@ OF_SENSOR = {
     Sensor.FLOW_RATE: "OPTICAL_FLOW_RAD",
     Sensor.RANGE: "DISTANCE_SENSOR",
 }
-KEPT_ESTIMATES = 20_000  # estimates heard
+KEPT_ESTIMATES = 20_000  # estimates received
 INTERVAL_FRACTION = 0.9  # of an interval that must have passed: schedules jitter; chosen
 
 
@@ -46,7 +46,7 @@ class Due(NamedTuple):
 
 
 class SimulatedVehicle:
-    """A flight as a list of messages. log: with an IMU, GPS, a skid switch and truth; what else it has is told, too."""
+    """A flight as a list of messages. log: with an IMU, GPS, a skid switch and truth; other sensors are sent too."""
 
     def __init__(self, log: Log, *, key: bytes | None = None, system: int = SYSTEM, boot_s: float = BOOT_S) -> None:
         self._log, self._key, self._boot_s = log, key, boot_s
@@ -86,7 +86,7 @@ class SimulatedVehicle:
 
     @property
     def finished(self) -> bool:
-        """Whether all has been said."""
+        """Whether every message has been sent."""
         return not self._due
 
     def truth_at(self, t_s: float) -> tuple[Array, Array]:
@@ -112,7 +112,7 @@ class SimulatedVehicle:
         return frames
 
     def hear(self, piece: bytes, t_s: float) -> list[bytes]:
-        """What is answered to what arrives at a time of the flight, whole frames or pieces of them."""
+        """The answers to the bytes that arrive at a time of the flight, whole frames or pieces of them."""
         answers = []
         for _, content in self._frames.feed(piece):
             message = self._coder.decode(bytearray(content))
@@ -158,7 +158,7 @@ class SimulatedVehicle:
         return self._truth(due.t_s)
 
     def _imu(self, due: Due, time_us: int) -> Message:
-        """The IMU with the field and the pressure that have come since it was told last."""
+        """The IMU with the field and the pressure that have come since it was last sent."""
 
         def news(sensor: Sensor) -> tuple[float, ...] | None:
             stream = self._log.streams.get(sensor)
@@ -176,7 +176,7 @@ class SimulatedVehicle:
         )  # fmt: skip
 
     def _attitude(self, t_s: float, time_ms: int) -> Message | None:
-        """What the autopilot says of its attitude: the one that it flies on."""
+        """The autopilot's attitude message: the attitude that it uses to fly."""
         own = self._log.autopilot
         if own is None:
             return None

@@ -13,7 +13,7 @@ NAN = float("nan")
 LONGEST_ROUND_TRIP_S = 0.5
 MOST_UNSEEN_S = 0.1  # of age when it is sent that a stamped message may have, beyond the wait on the link
 COARSE_S = 0.02  # of stamps in milliseconds, and of crystals that drift for FRESH_S
-LEAP_S = 0.3  # a stamp that is so much earlier than any before on the link: the clock leapt, or the stamp is wrong
+LEAP_S = 0.3  # a stamp that is earlier by this than any before on the link: the clock leapt, or the stamp is wrong
 STEP_S = 1.0  # TIMESYNC offsets that differ by more are of a vehicle that began anew
 EXCHANGES_KEPT = 16
 FRESH_S = 20.0
@@ -34,10 +34,10 @@ class Exchange(NamedTuple):
 class VehicleClock:
     """Session time: the vehicle's time since boot, which goes on through a reboot (see mavlink/clock.py).
 
-    Of stamps alone, the least wait on the link passes for none; a TIMESYNC exchange tells it, to within half its round
-    trip. The stamps of the last second rule: an exchange that contradicts them is of a clock that has been stopped or
-    set since, or a lie, and does not serve. counts: `clock_jump`, `clock_set` (another clock than the boot's),
-    `wrapped`, exchanges not believed (`timesync_refused`), and steps of a second or more between exchanges
+    Of stamps alone, the least wait on the link passes for none; a TIMESYNC exchange measures it, to within half its
+    round trip. The stamps of the last second rule: an exchange that contradicts them is of a clock that has been
+    stopped or set since, or a lie, and does not serve. counts: `clock_jump`, `clock_set` (another clock than the
+    boot's), `wrapped`, exchanges not believed (`timesync_refused`), and steps of a second or more between exchanges
     (`timesync_step`).
     """
 
@@ -46,7 +46,7 @@ class VehicleClock:
         self._leads: deque[tuple[float, float]] = deque(maxlen=2)  # since when, and session time less ours [s]
         self._exchanges: deque[Exchange] = deque(maxlen=EXCHANGES_KEPT)
         self._leaping, self._leap_s = 0, NAN  # stamps in a row that are ahead of our clock, and by how much
-        self._told_s = self._doubted_s = NAN  # offset that TIMESYNC tells, and one that differs by a step
+        self._told_s = self._doubted_s = NAN  # offset by TIMESYNC, and one that differs by a step
         self._said_s = self._ahead_s = NAN  # our clock when the time was asked for last, and session time less ours
         self.counts: Counter[str] = Counter()
 
@@ -100,7 +100,7 @@ class VehicleClock:
             )
 
     def exchanged(self, tc1_ns: int, ts1_ns: int, now_s: float) -> bool:
-        """A TIMESYNC reply to a request that we sent at `ts1_ns` of our clock; True where it tells of a new start."""
+        """A TIMESYNC reply to a request that we sent at `ts1_ns` of our clock; True where it shows a new start."""
         exchange = Exchange(now_s, *stamps.timesync_offset_s(tc1_ns, ts1_ns, round(now_s * 1e9)))
         if not 0.0 <= exchange.round_trip_s <= LONGEST_ROUND_TRIP_S:
             self.counts["timesync_refused"] += 1
@@ -115,7 +115,7 @@ class VehicleClock:
         return stepped
 
     def _stepped(self, offset_s: float) -> bool:
-        """Whether two exchanges in a row agree on an offset that is more than STEP_S from the one told before."""
+        """Whether two exchanges in a row agree on an offset that is more than STEP_S from the one in use."""
         if not abs(offset_s - self._told_s) > STEP_S:
             self._told_s, self._doubted_s = offset_s, NAN
             return False
@@ -126,8 +126,9 @@ class VehicleClock:
         return True
 
     def _serves(self, exchange: Exchange) -> bool:
-        """Whether an exchange agrees with the stamps: they say a later time by no more than its own uncertainty, and an
-        earlier one by no more than the wait on the link and a reading's own age when it is sent."""
+        """Whether an exchange agrees with the stamps: they show a later time by no more than its own uncertainty,
+        and an earlier one by no more than the wait on the link and a reading's own age when it is sent.
+        """
         ahead_s = exchange.offset_s + self._shift_s - self._offset_s
         return -0.5 * exchange.round_trip_s - COARSE_S <= ahead_s <= exchange.round_trip_s + MOST_UNSEEN_S
 
@@ -143,7 +144,7 @@ class VehicleClock:
         return min(fresh, key=lambda exchange: exchange.round_trip_s, default=None)
 
     def now_s(self, now_s: float) -> float:
-        """Session time at an instant of our clock; NaN before the vehicle's clock was heard. Never behind a stamp.
+        """Session time at an instant of our clock; NaN before the vehicle's clock was received. Never behind a stamp.
 
         A loaded link makes every stamp seem later, and the time with it: it goes slower until that is made up.
         """

@@ -1,6 +1,6 @@
 """Where a session records to, and the thread that writes its journal.
 
-A record has a name that nobody has, and a journal beside it that nobody else writes. What is handed over is on the disk
+A record has an unused name, and a journal next to it that nobody else writes. Rows passed to the writer are on the disk
 within a second, and nobody waits.
 """
 
@@ -117,7 +117,8 @@ def _made(journal: Path, record: Path) -> int | None:
 
 
 class Writer:
-    """Takes what is said and rows, at once; writes them in blocks. `reason` says why it stopped writing, "" until then.
+    """Takes entries and rows without blocking; writes them in blocks. `reason` says why it stopped writing, "" until
+    then.
 
     failed: called once, in the writing thread, with that reason.
     """

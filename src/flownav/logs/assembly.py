@@ -18,7 +18,7 @@ LONGEST_GAP_S = 600.0  # a few rows further away than this carry a wrong time
 FARTHEST_FIX_DEG = 0.5
 
 Origin = tuple[float, float, float]  # latitude, longitude [deg], altitude [m]
-# what a vehicle's sensor can say at most, in the unit of `measurement.COLUMNS`; beyond it a bit or a unit is wrong
+# the most that a vehicle's sensor can measure, in the unit of `measurement.COLUMNS`; beyond it a bit or a unit is wrong
 MOST: dict[Sensor, tuple[float, ...]] = {
     Sensor.GPS_VELOCITY: (150.0,) * 3,
     Sensor.FLOW_RATE: (70.0,) * 4,
@@ -85,7 +85,7 @@ def drop_strays(rows: Rows) -> None:
 
 
 def drop_duplicates(rows: Rows) -> None:
-    """Throw away rows that say the same at the same time as the row before; two readings at one time both stay."""
+    """Remove rows that repeat the row before at the same time; two readings at one time both stay."""
     again = np.zeros(len(rows), bool)
     again[1:] = np.diff(rows.t_s) == 0
     for values in rows.columns.values():
@@ -94,7 +94,7 @@ def drop_duplicates(rows: Rows) -> None:
 
 
 def fresh_rows(t_s: Array, value: Array) -> NDArray[np.bool_]:
-    """Rows that say something new of a slow sensor, logged at the rate of a fast one: value (n, k).
+    """Mask of the rows that are new readings of a slow sensor, logged at the rate of a fast one: value (n, k).
 
     A changed value, or the same after HELD_S; SLOW_S apart at the least.
     """
@@ -174,7 +174,7 @@ def sensor_stream(
     """A sensor's readings in time order; None where none is usable.
 
     t_s (n,), value (n, k), variance (n, k) and quality (n,) as in Stream. Variances that cannot be are as if
-    unstated. Rows that are not finite, late, repeated, or beyond what a sensor can say are counted in `rejected`.
+    unstated. Rows that are not finite, late, repeated, or beyond a sensor's possible values are counted in `rejected`.
     """
     count, width = len(t_s), len(COLUMNS[sensor])
     value = np.asarray(value, float).reshape(count, width)
@@ -196,13 +196,15 @@ def sensor_stream(
 
 
 def stream_of_rows(sensor: Sensor, rows: Rows, names: Sequence[str], delay_s: float) -> Stream:
-    """The columns `names` of rows that are in order, as far as the sensor can say them; the rest is counted."""
+    """The columns `names` of rows that are in order, within the sensor's possible values; the rest is counted."""
     keep_possible(rows, sensor, names)
     return Stream.of(sensor, rows.t_s, rows.matrix(*names), delay_s=delay_s, rejected=rows.rejected)
 
 
 def keep_possible(rows: Rows, sensor: Sensor, names: Sequence[str]) -> None:
-    """Leave the rows with a number where one must be, and that the sensor can say; names: as COLUMNS has its values."""
+    """Leave the rows with a number where one must be, within the sensor's possible values; names: as COLUMNS has its
+    values.
+    """
     finite = np.isfinite(rows.t_s) & np.isfinite(rows.columns.get("quality", 0.0))
     for k, name in enumerate(names):
         if k not in MAY_LACK.get(sensor, ()):
@@ -273,7 +275,7 @@ def streams_of_fixes(
 ) -> tuple[list[Stream], Origin | None]:
     """Velocity (n, 3), then position about the first of the fixes, and that fix; nothing without one.
 
-    No velocity where the receiver never tells one: it is a sensor that is not there, not one that fails.
+    No velocity where the receiver never sends one: it is a sensor that is not there, not one that fails.
     """
     if not len(fixes):
         return [], None

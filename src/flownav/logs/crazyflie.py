@@ -1,4 +1,4 @@
-"""A log of the Crazyflie's micro SD deck as a Log. docs/reference/crazyflie.md says which variables are read.
+"""A log of the Crazyflie's micro SD deck as a Log. docs/reference/crazyflie.md lists the variables that are read.
 
 Axes. The Crazyflie's body is forward-left-up and its world z up with x where it was switched on: both are half-turned
 about x, so that its x is "north" here (there is no true north in such a log). `stateEstimate.pitch` is nose up positive

@@ -41,7 +41,7 @@ class Block:
 
 @dataclass
 class Blocks:
-    """What a file holds, and what is wrong with it."""
+    """The blocks of a file, and notes on its damage."""
 
     found: list[Block]
     sha256: str

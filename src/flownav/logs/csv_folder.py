@@ -66,7 +66,7 @@ FILES: dict[str, tuple[Column, ...]] = {
     "truth": tuple(Column(f"{axis}_m", -1e5, 1e5, METRES) for axis in "xyz"),
     "heading_truth": (Column("yaw_rad", -10 * HALF_TURN, 10 * HALF_TURN, RADIANS),),  # may be counted on over turns
 }
-SELDOM = ("landed",)  # written when there is something to say
+SELDOM = ("landed",)  # written only at events
 
 
 def read_csv_folder(folder: Path) -> Log:

@@ -1,7 +1,7 @@
 """One CSV file of a log as columns of numbers, its rows checked: finite, inside limits, in time order.
 
-Bad rows are thrown away and counted by reason. Where so many are bad that the file cannot be what its column
-names say (a wrong unit, two logs in one file), that is an InputError of one line.
+Bad rows are thrown away and counted by reason. Where too many are bad for the file to be what its column names state (a
+wrong unit, two logs in one file), that is an InputError of one line.
 """
 
 from collections import Counter
@@ -33,7 +33,7 @@ class Column:
     high: float
     hint: str = ""
     required: bool = True
-    may_be_empty: bool = False  # NaN says that the sensor has no such figure
+    may_be_empty: bool = False  # NaN means that the sensor has no such figure
 
 
 @dataclass
@@ -45,7 +45,7 @@ class CsvTable(Rows):
     notes: list[str] = field(default_factory=list)
 
     def stream(self, sensor: Sensor, *names: str, quality: str = "") -> Stream:
-        """Columns as a sensor's stream; quality: the column that says it, if any."""
+        """Columns as a sensor's stream; quality: its column, if any."""
         level = self.columns[quality] if quality else None
         return Stream.of(sensor, self.t_s, self.matrix(*names), quality=level, rejected=self.rejected)
 

@@ -1,6 +1,6 @@
-"""What a vehicle's log says besides what its sensors read: modes, source sets, messages, what its own filter took.
+"""Events in a vehicle's log besides its sensor readings: modes, source sets, messages, sensors used by its own filter.
 
-The values of `Log.happened`, one row each. A state stands there when it is first told and whenever it changes.
+The values of `Log.happened`, one row each. A state stands there when it is first reported and whenever it changes.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -11,13 +11,13 @@ import numpy as np
 from flownav.core.measurement import Array
 
 MODE = "mode"  # text: its name; value: its number
-MESSAGE = "message"  # text: as the vehicle told its pilot
+MESSAGE = "message"  # text: as the vehicle sent it to its pilot
 PARAMETER = "parameter"  # text: its name; value: what it was set to in flight
 SOURCE_SET = "source set"  # value: 1, 2, 3 of ArduPilot's EK3_SRCn
 FUSES_FLOW = "fuses flow"  # value: 1 where the autopilot's filter takes its flow, else 0
 CLIPPING = "clipping"  # value: accelerometer samples at the end of their range so far, all axes
 VIBRATION = "vibration"  # value: the vehicle's own level of its accelerometer's vibration [m/s2], in steps of 5
-MOST_ROWS = 2000  # of one kind: a log that tells more has little to say in each
+MOST_ROWS = 2000  # of one kind: a log with more has little information in each
 
 
 class Happened(NamedTuple):

@@ -28,7 +28,7 @@ DTYPE = np.dtype("<f8")
 
 
 class Block(NamedTuple):
-    """A whole block: its number, what it says, and rows by name, each (n, columns)."""
+    """A whole block: its number, its entries, and rows by name, each (n, columns)."""
 
     number: int
     said: dict[str, Any]
@@ -58,7 +58,7 @@ def block(number: int, said: Mapping[str, Any], rows: Mapping[str, Array] | None
 
 
 def blocks(data: memoryview) -> Iterator[Block | Damage]:
-    """What a journal's bytes hold, in order. Takes time in proportion to them, whatever they are."""
+    """Yield the blocks and damage of a journal's bytes, in order. The time grows in proportion to their number."""
     place, bad, patience = len(MAGIC), -1, 4 * len(data)
     while place < len(data):
         length = _payload_length(data, place)

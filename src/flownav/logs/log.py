@@ -28,7 +28,7 @@ class Absence(NamedTuple):
 
 
 class FedSegment(NamedTuple):
-    """What one navigator was fed: its equipment (fields of navigation.feed.Equipment by name), and the queue."""
+    """The input of one navigator: its equipment (fields of navigation.feed.Equipment by name), and the queue."""
 
     equipment: dict[str, Any]
     queue: EventQueue
@@ -39,22 +39,19 @@ class Log:
     """A recorded flight as streams.
 
     streams: by sensor, times in seconds of the log's own clock, in the units and frames of `measurement`.
-    clock_start_s: what the vehicle's clock, by which its log is stamped, showed at time 0 of the streams [s]; None
-    where the log does not say.
-    origin_deg_m: latitude, longitude [deg] and altitude [m] of the local frame's origin; None without GPS.
-    truth: an external reference, columns as record.TABLES["truth"]; its frame may be turned in yaw.
+    clock_start_s: time of the vehicle's clock, by which its log is stamped, at time 0 of the streams [s]; None where
+    the log does not give it. origin_deg_m: latitude, longitude [deg] and altitude [m] of the local frame's origin; None
+    without GPS. truth: an external reference, columns as record.TABLES["truth"]; its frame may be turned in yaw.
     truth_name: where the reference comes from; of visual odometry it is an estimate itself, and no truth.
     heading_truth: the vehicle's heading in the truth's frame, columns t_s and yaw_rad, where it came apart from it.
-    inputs: SHA-256 of each file read, by name. notes: what a reader would tell the user, one line each.
-    autopilot: what the vehicle's own estimator said, columns as record.TABLES["autopilot"], and its name.
-    fed: of a live session, what its filter was fed, in order, navigator by navigator; fed_settings: the filter's
-    settings and what else shaped it.
-    limits: what a sensor states of itself, lowest and highest, by name with unit ("range_m", "flow_height_m",
-    "flow_rad_s"). absences: what the log lacks.
-    parameters: the vehicle's own settings by name, as last written; empty where the log has none. happened: what it
-    says besides its sensors, in order of time (`logs/happened.py`). setpoints: what the autopilot asked for, in the
-    frame of its estimate: tables of position and of attitude, each at its own times. battery: columns as
-    record.TABLES["battery"].
+    inputs: SHA-256 of each file read, by name. notes: remarks of the reader for the user, one line each. autopilot: the
+    vehicle's own estimates, columns as record.TABLES["autopilot"], and its name. fed: of a live session, the input of
+    its filter, in order, navigator by navigator; fed_settings: the filter's settings and other options. limits: the
+    range that a sensor states of itself, lowest and highest, by name with unit ("range_m", "flow_height_m",
+    "flow_rad_s"). absences: the sensors that the log lacks. parameters: the vehicle's own settings by name, as last
+    written; empty where the log has none. happened: its events besides the sensors' readings, in order of time
+    (`logs/happened.py`). setpoints: the autopilot's set-points, in the frame of its estimate: tables of position and of
+    attitude, each at its own times. battery: columns as record.TABLES["battery"].
     """
 
     path: Path
@@ -97,7 +94,7 @@ INSTEAD = {
 
 
 def absences_of(streams: Mapping[Sensor, Stream], **said: str) -> Iterator[Absence]:
-    """What the streams lack. said: what the reader knows better, by name of the sensor, for `Absence.what`."""
+    """The sensors that the streams lack. said: the reader's own text for `Absence.what`, by name of the sensor."""
     for sensor, absence in INSTEAD.items():
         if sensor not in streams:
             alone = sensor == Sensor.ATTITUDE and Sensor.IMU not in streams

@@ -84,10 +84,10 @@ class Decoder:
 
 
 class Flight:
-    """What the messages of one vehicle's system tell.
+    """The content of the messages of one vehicle's system.
 
     gathered: readings by sensor and source. states: (log time, state) by message name. origin_deg_m, limits: as in
-    Log. counts: messages left out, by what they are; clock jumps. notes: what was done to the states.
+    Log. counts: messages left out, by what they are; clock jumps. notes: on changes made to the states.
     """
 
     def __init__(self, decoder: Decoder, vehicle: Vehicle, frames: list[Frame]) -> None:
@@ -221,7 +221,9 @@ class Flight:
 
 
 def find_vehicle(decoder: Decoder, frames: list[Frame]) -> tuple[Vehicle, list[str]]:
-    """The autopilot whose HEARTBEAT says so and that sent the most; without one, who sent the most. And notes."""
+    """The sender of autopilot's HEARTBEATs with the most frames; without one, the sender of the most frames. And
+    notes.
+    """
     sent = Counter((frame.system, frame.component) for frame in frames)
     makes = {
         (frame.system, frame.component): int(message.autopilot)

@@ -87,7 +87,7 @@ class Gathered:
         notes: list[str] = []
         for sensor, sources in sorted(wanted.items()):
             if sensor == Sensor.FLOW_VELOCITY and any(r.useful for r in wanted.get(Sensor.FLOW_RATE, {}).values()):
-                notes.append("flow_velocity is left out: flow_rate tells of the same flow")
+                notes.append("flow_velocity is left out: flow_rate is of the same flow")
                 continue
             source = _best(sensor, sources)
             stream = sources[source].stream(sensor)

@@ -1,4 +1,4 @@
-"""Any recorded flight as a Log: what a path holds is told from its first bytes, its reader is imported then."""
+"""Any recorded flight as a Log: the format is found from a path's first bytes, and its reader is imported then."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -41,9 +41,10 @@ YEARS_US = (1.0e15, 4.2e15)  # microseconds of the years 2001 to 2103
 
 
 def open_log(path: Path, *, flow_instance: int | None = None, topics: Mapping[str, str] | None = None) -> Log:
-    """Read a recorded flight of any known format; of its reference, strays are left out and leaps taken back, and said.
+    """Read a recorded flight of any known format; of its reference, strays are left out and leaps taken back, each with
+    a note.
 
-    flow_instance: which of several flow sensors; None takes the one with most to say. topics: of a ROS bag, which
+    flow_instance: which of several flow sensors; None takes the one with most readings. topics: of a ROS bag, which
     topic serves as what, by role. InputError where the path is missing or no known format, or the log cannot be read.
     """
     log = _read(path, flow_instance, topics)
@@ -106,7 +107,7 @@ def open_flight(path: Path, *, flow_instance: int | None = None, topics: Mapping
 
 
 def log_kind(path: Path) -> str:
-    """What a file holds, by its first bytes and its suffix; "" for anything else.
+    """The kind of a log file, by its first bytes and its suffix; "" for anything else.
 
     "ulog", "dataflash", "tlog", "ros" (a bag of ROS), "crazyflie", "blackbox", "record" or "journal".
 

@@ -1,7 +1,7 @@
 """Do a log's sensors agree with each other? A unit or a sign that cannot be shows here.
 
 Limits on single values miss degrees in a calm hover, or a position in radians. Two sensors that see the same
-motion do not: the accelerometer must see gravity where the attitude says down is, the gyros must turn as the
+motion do not: the accelerometer must see gravity along the attitude's down, the gyros must turn as the
 attitude turns, the GPS velocity must integrate to the GPS position. The bounds are wide: only a wrong unit,
 axis or sign breaks them, never a bad sensor.
 """

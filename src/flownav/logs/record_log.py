@@ -31,7 +31,7 @@ MOST_COLUMNS = 256
 def read_live_record(path: Path, *, flow_instance: int | None = None) -> Log:
     """Read a record that `flownav live --record` or `flownav fly` wrote.
 
-    InputError where it cannot be read, says not what a navigator was fed, or a flow instance is asked for.
+    InputError where it cannot be read, does not hold the input of a navigator, or a flow instance is asked for.
     """
     if flow_instance is not None:
         raise InputError(
@@ -45,7 +45,7 @@ def log_of_record(path: Path, record: Record) -> Log:
     kind = str(record.manifest.get("kind"))
     if kind not in KINDS or "fed" not in record.tables:
         raise InputError(
-            f"{path}: a record of kind {kind!r} that does not say what a navigator was fed; `flownav live --record` "
+            f"{path}: a record of kind {kind!r} without the input of a navigator; `flownav live --record` "
             "and `flownav fly` write one that does"
         )
     try:
@@ -53,12 +53,12 @@ def log_of_record(path: Path, record: Record) -> Log:
         segments = [dict(segment) for segment in record.manifest["segments"]]
         parameters = dict(record.manifest["parameters"])
         if not len(fed):
-            raise InputError(f"{path}: its navigator heard nothing that it could use")
+            raise InputError(f"{path}: its navigator received nothing that it could use")
         _check(fed, len(segments))
         numbers = fed[:, FED.index("segment")].astype(int)
         heard = _streams(fed)
         if not heard:
-            raise InputError(f"{path}: its navigator heard nothing that it could use")
+            raise InputError(f"{path}: its navigator received nothing that it could use")
         streams = _with_late(heard, record.manifest.get("live"))
         parts = tuple(FedSegment(_floats(segments[i]), _queue(fed, numbers == i)) for i in range(len(segments)))
     except (KeyError, IndexError, TypeError, ValueError) as error:
@@ -147,7 +147,7 @@ def _streams(fed: Array) -> dict[Sensor, Stream]:
 
 
 def _with_late(streams: dict[Sensor, Stream], facts: Any) -> dict[Sensor, Stream]:
-    """What a live session's horizon left out as late, as rejections of the sensors, heard in time or never."""
+    """Streams with the readings that a live session's horizon left out as late, as rejections, for every sensor."""
     dropped = facts.get("dropped") if isinstance(facts, dict) else None
     for sensor in Sensor:
         late = dropped.get(f"{sensor.name.lower()}: {LATE}") if isinstance(dropped, dict) else None

@@ -1,8 +1,8 @@
-"""Is a log's reference one path in one frame? Rows that cannot be are left out, leaps taken back, and both are said.
+"""Is a log's reference one path in one frame? Rows that cannot be are left out, leaps taken back, and both are noted.
 
 A tracker mistakes a marker, a simulator sets its vehicle elsewhere, visual odometry starts anew: one row at 50 km is
-not an error of 700 m rms of whatever is held against it. The path goes on where it was; what it does within each piece
-is scored as it is.
+not an error of 700 m rms of the estimate compared with it. The path goes on where it was; within each piece it is
+scored as it is.
 """
 
 from collections.abc import Mapping, Sequence
@@ -104,8 +104,9 @@ def lasting(leaps: Sequence[Leap], t_s: Array, position: Array) -> list[Leap]:
     """Those leaps after which a path (n,), (n, 3) stays apart from where it was going.
 
     The path of a second before, and of one after, are each carried to the leap by their median velocity. A row with a
-    late stamp, a spike that settles, or noise leaves the two together. Where a place was told for more than a second
-    before, the vehicle stood there, or its tracker had lost it: a way that either velocity makes meanwhile is no leap.
+    late stamp, a spike that settles, or noise leaves the two together. Where one place was repeated for more than a
+    second before, the vehicle stood there, or its tracker had lost it: a way that either velocity makes meanwhile is no
+    leap.
     """
     new = np.flatnonzero(np.concatenate([[True], (np.diff(position, axis=0) != 0.0).any(axis=1)]))
     at_s, path = t_s[new], position[new]
@@ -177,7 +178,7 @@ def of_one_origin(t_s: Array, local: Array, known_t_s: Array, known: Array) -> t
 
 
 def _short_pieces(t_s: Array, position: Array, possible: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The rows of pieces between leaps, and before and after them, that are too short to be told of."""
+    """The rows of pieces between leaps, and before and after them, that are too short to be reported."""
     short = np.zeros(len(t_s), bool)
     leaps = [leap.t_s for leap in leaps_of(t_s[possible], position[possible])]
     edges = [-np.inf, *leaps, np.inf] if leaps else []

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from flownav.core.errors import InputError
 
-# what a replay cannot do without, and how it is told that a folder holds such files
+# files that a replay needs, and by which such a folder is recognised
 CARRIERS = (
     "vehicle_attitude", "sensor_combined", "vehicle_imu", "vehicle_gps_position", "sensor_gps", "vehicle_optical_flow",
     "optical_flow", "sensor_optical_flow", "vehicle_visual_odometry",

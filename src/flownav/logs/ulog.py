@@ -1,6 +1,6 @@
 """A PX4 ULog file as a Log: topics of every age of PX4, in the units and frames of `measurement`.
 
-What PX4 says in float or integer, degrees or 1e-7 degrees, radians accumulated or rates, is the same here. Message
+PX4's values in float or integer, degrees or 1e-7 degrees, accumulated radians or rates, have one form here. Message
 definitions: PX4-Autopilot, msg/. The page is docs/reference/logs.md.
 """
 
@@ -87,7 +87,7 @@ def log_of_topics(
 ) -> Log:  # fmt: skip
     """A Log from PX4's topics, wherever they were recorded.
 
-    inputs: SHA-256 by file. notes: what the reader of the file says. reference: a path that somebody else recorded, in
+    inputs: SHA-256 by file. notes: those of the file's reader. reference: a path that somebody else recorded, in
     NED about a frame of its own, instead of PX4's ground truth. InputError as of `read_ulog`.
     """
     flow = flow_topic(path, topics, flow_instance)
@@ -140,7 +140,7 @@ def _sensors(topics: Topics, flow: Topic | None, attitude: Stream | None) -> Ite
 
 
 def _slow_imu(topics: Topics) -> str:
-    """What inertial readings there are, where they come too slowly to be used."""
+    """The note on the inertial readings, where they come too slowly to be used; "" without any."""
     label, rate_hz, count = sensed.fastest_imu(topics)
     if not label or rate_hz >= sensed.LEAST_IMU_HZ:
         return ""

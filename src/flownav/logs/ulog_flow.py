@@ -42,7 +42,7 @@ def flow_topic(path: Path, topics: Topics, instance: int | None) -> Topic | None
 
 
 def flow_stream(topics: Topics, topic: Topic) -> Stream:
-    """Rates of the flow and of the sensor's gyro (NaN where it has none), as old as PX4 says they are."""
+    """Rates of the flow and of the sensor's gyro (NaN where it has none), with the age that PX4 states."""
     dt_s = _integration_s(topic)
     quality = np.nan_to_num(topic.columns.get("quality", np.full(len(topic), 255.0)))
     flow, gyro = _accumulated(topic)
@@ -132,7 +132,7 @@ def _keep_downward(topic: Topic) -> None:
 
 
 def reading_limits(topics: Topics, flow: Topic | None) -> dict[str, tuple[float, float]]:
-    """What the rangefinder and the flow sensor state of themselves; 0 and 0, or nonsense, is no statement."""
+    """The limits that rangefinder and flow sensor state of themselves; 0 and 0, or nonsense, is no statement."""
     ranges = [topic for topic in topics.of("distance_sensor") if len(topic)]
     limits = {}
     if ranges:

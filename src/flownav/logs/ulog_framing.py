@@ -1,9 +1,9 @@
-"""The messages of a ULog file, one by one, before they are handed to pyulog.
+"""The messages of a ULog file, one by one, before they are passed to pyulog.
 
 pyulog believes a file: a lying length, a nested format that grows without end or a damaged parameter makes it search
-byte by byte, fill the memory, or stop early without a word. So the framing is read here, each message is checked
-against what the definitions say of it, damage is skipped and counted, and only whole messages of the wanted topics are
-kept, as places in the file. Format: docs.px4.io, "ULog File Format".
+byte by byte, fill the memory, or stop early without an error. So the framing is read here, each message is checked
+against its definitions, damage is skipped and counted, and only whole messages of the wanted topics are kept, as places
+in the file. Format: docs.px4.io, "ULog File Format".
 """
 
 import re
@@ -45,12 +45,12 @@ id_at = struct.Struct("<H").unpack_from
 
 @dataclass
 class Framed:
-    """What a file holds of the wanted topics, and what was wrong with the rest.
+    """The wanted topics of a file, and the damage in the rest.
 
     content: their definitions as a sound ULog with one row of each. rows: where all of their rows begin, by message id,
     in the file's order. dropouts_s: gaps that the logger itself states [s].
     rejected: messages by reason. damaged: number of stretches skipped, and their bytes.
-    system: who says that it wrote the log ("PX4"). messages: logged strings with the clock's time [s].
+    system: the name of the system that wrote the log ("PX4"). messages: logged strings with the clock's time [s].
     """
 
     content: bytes = b""

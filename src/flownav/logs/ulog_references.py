@@ -1,4 +1,4 @@
-"""What a ULog holds to compare with: ground truth, visual odometry, and what the autopilot itself estimated."""
+"""A ULog's references: ground truth, visual odometry, and the autopilot's own estimates."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ NEW_FRAMES = {1: NED, 2: FRD, 3: BODY}
 
 
 def truth_of(topics: Topics, odometry_serves: bool) -> tuple[Table | None, str]:
-    """A simulator's ground truth; else, if it may serve, the visual odometry, with the note that says so."""
+    """A simulator's ground truth; else, if it may serve, the visual odometry, with a note."""
     place = topics.fullest("vehicle_local_position_groundtruth", needs=("x", "y", "z"))
     if place is not None:
         place.keep(np.isfinite(place.matrix("x", "y", "z")).all(axis=1), "not_finite")

@@ -1,4 +1,4 @@
-"""What a ULog says besides its sensors: PX4's modes, messages, set-points, battery, whether EKF2 took the flow."""
+"""A ULog's content besides its sensors: PX4's modes, messages, set-points, battery, whether EKF2 took the flow."""
 
 from collections.abc import Iterator
 
@@ -25,7 +25,7 @@ CLIPPING_S = 1.0
 
 
 def happened(topics: Topics) -> tuple[Happened, ...]:
-    """Everything that the topics and the logged strings tell, in order of time."""
+    """All events in the topics and the logged strings, in order of time."""
     told = ((t_s - topics.start_s, text) for t_s, text in topics.messages)
     return in_time([*_states(topics), *messages(told)])
 
@@ -47,7 +47,7 @@ def _states(topics: Topics) -> Iterator[Happened]:
 
 
 def setpoints(topics: Topics) -> tuple[Table, ...]:
-    """What PX4 asked for: position in its local frame, and attitude; a component that it does not control is NaN."""
+    """PX4's set-points: position in its local frame, and attitude; a component that it does not control is NaN."""
     place, attitude = topics.fullest(ASKED[0], needs="xyz"), topics.fullest(ASKED[1], needs=["q_d[0]", "q_d[3]"])
     found = []
     if place is not None:
@@ -58,7 +58,7 @@ def setpoints(topics: Topics) -> tuple[Table, ...]:
 
 
 def battery(topics: Topics) -> Table | None:
-    """The battery that was told of most often; None where none was, or none with a voltage."""
+    """The battery that was reported most often; None where none was, or none with a voltage."""
     told = topics.fullest("battery_status", needs=("voltage_v",))
     if told is None or not (told.column("voltage_v") > 0.0).any():
         return None

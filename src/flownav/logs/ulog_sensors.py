@@ -8,14 +8,14 @@ from flownav.logs import assembly
 from flownav.logs.log import attitude_at
 from flownav.logs.ulog_topics import Topic, Topics
 
-LEAST_IMU_HZ = 20.0  # slower, an inertial reading says nothing of the motion between two
+LEAST_IMU_HZ = 20.0  # slower, an inertial reading does not show the motion between two
 FASTEST_M_S = 150.0
 QUATERNION_FIELDS = tuple(f"q[{k}]" for k in range(4))
 IMU_FIELDS = tuple(f"imu[{k}]" for k in range(6))
 VELOCITY_FIELDS = ("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
 LARGEST_HECTOPASCAL = 2000.0
 LARGEST_RELATIVE_US = 1e6  # RELATIVE_TIMESTAMP_INVALID is far above
-YAW_90 = 2.0  # PX4's rotation of an IR-LOCK where no parameter says another
+YAW_90 = 2.0  # PX4's rotation of an IR-LOCK unless a parameter gives another
 
 
 def attitude_stream(topics: Topics) -> tuple[Stream | None, str]:
@@ -94,7 +94,7 @@ def gps_streams(topics: Topics) -> tuple[list[Stream], assembly.Origin | None]:
         return [], None
     most = max(candidates, key=lambda topic: int(np.count_nonzero(topic.columns.get("fix_type", np.zeros(1)) >= 3)))
     fixes = _fixes(most)
-    sigma = fixes.matrix("s_variance_m_s", "eph", "epv")  # accuracies [m/s, m], whatever the first one's name says
+    sigma = fixes.matrix("s_variance_m_s", "eph", "epv")  # accuracies [m/s, m], in spite of the first one's name
     sigma[~(sigma > 0)] = np.nan
     velocity = fixes.matrix(*VELOCITY_FIELDS)
     return assembly.streams_of_fixes(fixes, velocity, sigma[:, [0, 0, 0]] ** 2, sigma[:, [1, 1, 2]] ** 2, fixes.delay_s)

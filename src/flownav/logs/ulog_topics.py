@@ -23,7 +23,7 @@ LONGEST_DELAY_S = 1.0  # a sample older than this on arrival carries a wrong tim
 
 @dataclass
 class Topic(Rows):
-    """One instance of a topic. t_s: when it was published; column `sample_s`, where there, when it was so."""
+    """One instance of a topic. t_s: when it was published; column `sample_s`, where there, when it was sampled."""
 
     name: str = ""
     instance: int = 0
@@ -75,8 +75,8 @@ class Topic(Rows):
 class Topics:
     """The wanted topics of a file, parameters, and what was wrong with the file.
 
-    start_s: what the file's clock shows at time 0 of the topics. system: who says that it wrote the log. messages:
-    logged strings with the file's own time [s].
+    start_s: what the file's clock shows at time 0 of the topics. system: the name of the system that wrote the log.
+    messages: logged strings with the file's own time [s].
     """
 
     found: list[Topic]
@@ -104,8 +104,8 @@ class Topics:
 def read_topics(path: Path, wanted: Collection[str], fields: Collection[str], states: Collection[str]) -> Topics:
     """The wanted topics with the fields named, times in seconds since the first reading.
 
-    states: topics that hold for longer than they are published; what they said before the first reading of a sensor
-    is put at its time. InputError where the file cannot be read, is no ULog, or holds none of the topics.
+    states: topics that hold for longer than they are published; their values before the first reading of a sensor are
+    put at its time. InputError where the file cannot be read, is no ULog, or holds none of the topics.
     """
     content, sha256 = _content(path)
     framed = frame(path, content, wanted)
@@ -184,7 +184,7 @@ def count_from_first(found: list[Topic], states: Collection[str]) -> float:
 
 
 def _notes(framed: Framed) -> list[str]:
-    """What was wrong with the file as a whole, one line each."""
+    """Notes on the damage of the file as a whole, one line each."""
     notes = []
     if framed.dropouts_s:
         notes.append(

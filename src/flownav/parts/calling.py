@@ -1,4 +1,4 @@
-"""Python called from compiled loops: C functions with an address, whose first mistake is kept and told afterwards."""
+"""Python called from compiled loops: C functions with an address; their first exception is raised afterwards."""
 
 import ctypes
 import inspect
@@ -8,7 +8,7 @@ from typing import Any
 
 from flownav.core.errors import InputError
 
-LONGEST_NAME, LONGEST_SAID = 60, 400  # letters of a message; a compiler says pages
+LONGEST_NAME, LONGEST_SAID = 60, 400  # letters of a message; a compiler writes pages
 KINDS = {"p": ctypes.c_void_p, "q": ctypes.c_void_p, "d": ctypes.c_double, "i": ctypes.c_int64}
 
 
@@ -29,7 +29,7 @@ class Mistakes:
 
 @contextmanager
 def telling(name: str) -> Iterator[None]:
-    """What a part raises in here is an InputError of one line, and its exception the cause; Ctrl-C stays Ctrl-C."""
+    """Turn a part's exception into an InputError of one line with that exception as its cause; Ctrl-C stays Ctrl-C."""
     try:
         yield
     except (InputError, KeyboardInterrupt):
@@ -39,7 +39,7 @@ def telling(name: str) -> Iterator[None]:
 
 
 def words_of(mistake: BaseException) -> str:
-    """An exception in one line, its kind and what it says, if it can."""
+    """An exception in one line, its kind and its message, if it has one."""
     try:
         said = " ".join(str(mistake).split())
     except Exception:

@@ -1,6 +1,6 @@
-"""The fast path: a filter or a vehicle of one's own written as equations, compiled into the loop and flown on lanes.
+"""The fast path: a filter or a vehicle of one's own written as equations, compiled into the loop and run on lanes.
 
-What is written is the same as in the navigator's own rooms: named tuples of floats in and out, `@equation` functions of
+The equations are written as in the navigator's own rooms: named tuples of floats in and out, `@equation` functions of
 scalars. From Python they are plain Python, so the object also flies on the slow path; a test holds the two together.
 """
 
@@ -45,9 +45,10 @@ NAN = math.nan
 
 
 class Said(NamedTuple):
-    """What a filter says, as `protocols.Estimate` in scalars. known: 1 once it has started; variances in m2, m2/s2.
+    """The estimate of a filter, as `protocols.Estimate` in scalars. known: 1 once it has started; variances in m2,
+    m2/s2.
 
-    grounded: 1 once ground_d is known. What equations leave out at its end is by default.
+    grounded: 1 once ground_d is known. Fields at its end that equations leave out have their defaults.
     """
 
     known: float
@@ -83,7 +84,7 @@ def address_of(compiled: Unit, name: str) -> int:
         return compiled.address
 
 
-# the rows that simulator and tape read what a filter says from, field by field
+# the rows from which simulator and tape read a filter's estimate, field by field
 SAID_ROWS = (
     START,
     *range(STATE + POSITION, STATE + POSITION + 3),
@@ -141,7 +142,7 @@ class EquationFilter:
         return take_own
 
     def unit(self, lanes: Lanes) -> Unit:
-        """Compiled for so many lanes when it is first run, and kept on disk."""
+        """The unit compiled for this number of lanes when it is first run, and kept on disk."""
         if lanes not in self._units:
             self._units[lanes] = unit(self.unit_source, UNIT_SIGNATURE, lanes=lanes)
         return self._units[lanes]
@@ -151,7 +152,7 @@ class EquationFilter:
         return {}
 
     def __deepcopy__(self, memo: dict[int, Any]) -> EquationFilter:
-        """A filter that has heard nothing; what was compiled is shared."""
+        """A new filter, in its state before the first reading; the compiled code is shared."""
         other = EquationFilter(self.name, self.memory, self.step, self.say)
         other.__dict__["_units"] = self._units
         return other
@@ -177,7 +178,7 @@ class EquationFilter:
         return []
 
     def estimate(self) -> Estimate | None:
-        """The estimate, as `say` has it."""
+        """The estimate, from `say`."""
         said = self.say(self._now)
         if not said.known:
             return None

@@ -92,7 +92,7 @@ def fly_with(
 
 
 def names_of(parts: Parts) -> dict[str, Any]:
-    """What is not ours, by its name."""
+    """The user's own parts, by their names."""
     named: dict[str, Any] = {
         "filter": parts.filter and name_of(parts.filter),
         "sensors": [name_of(part) for part in parts.sensors],
@@ -103,9 +103,9 @@ def names_of(parts: Parts) -> dict[str, Any]:
 
 
 def require_started(flight: Flight, history: Array, name: str) -> None:
-    """InputError where a filter had said nothing by when it was to be flown on, or said what no vehicle does.
+    """InputError where a filter had no estimate when the autopilot began to use it, or an impossible one.
 
-    Until it speaks the truth is flown on. history: (epochs, len(HISTORY), lanes).
+    Until its first estimate the autopilot uses the truth. history: (epochs, len(HISTORY), lanes).
     """
     assert flight.table is not None
     first = math.ceil(flight.plan.handover_s / EPOCH_S) + flight.table.horizon_epochs + 1
@@ -113,10 +113,12 @@ def require_started(flight: Flight, history: Array, name: str) -> None:
     if len(said) and not said[0].all():
         silent = int(np.argmin(said[0]))
         late = np.flatnonzero(said[:, silent])
-        when = f"spoke first at {(first + late[0]) * EPOCH_S:.2f} s" if len(late) else "never said anything"
+        when = (
+            f"gave its first estimate at {(first + late[0]) * EPOCH_S:.2f} s" if len(late) else "never gave an estimate"
+        )
         raise InputError(
-            f"filter {name}: {when}, and is flown on from {flight.plan.handover_s:g} s on: estimate() must say "
-            "something by then"
+            f"filter {name}: {when}, and the autopilot uses it from {flight.plan.handover_s:g} s on: "
+            "estimate() must return one by then"
         )
     errors, places = (history[first:, columns(table, names)] for table, names in (("horizon", ERRORS), TRUE_PLACE))
     wild = np.any(~np.all(np.abs(errors) <= LARGEST, axis=1) & np.all(np.isfinite(places), axis=1), axis=1)
@@ -124,7 +126,7 @@ def require_started(flight: Flight, history: Array, name: str) -> None:
 
 
 def require_none(wild: ArrayLike, t_s: Array, name: str) -> None:
-    """InputError at the first instant at which a filter said what no vehicle does; wild, t_s: (n,)."""
+    """InputError at the first instant at which a filter's estimate is impossible; wild, t_s: (n,)."""
     if np.any(wild):
         at_s = float(t_s[int(np.argmax(wild))])
         raise InputError(f"filter {name}: its estimate of {at_s:.2f} s is not finite, or beyond {LARGEST:g}; mend it")
@@ -217,7 +219,7 @@ def recording_of(engine: Engine | None) -> Recording:
 
 
 def identities(parts: Parts) -> tuple[str, ...]:
-    """What a campaign's folder says of its parts: kind, name and SHA-256 of what they are made of.
+    """The identity of parts in a campaign's folder: kind, name and SHA-256 of their source and numbers.
 
     That is the class, the source of its file, and the object's own numbers. A campaign resumes with these alone.
     """
@@ -275,7 +277,7 @@ def replay_with(log: Log, options: ReplayOptions, settings: NavigatorSettingsFil
     try:
         flown = replay(log, options, settings, instead=instead)
     except InputError:
-        mistakes.tell()  # its own mistake says more than that it never started
+        mistakes.tell()  # its own exception is more informative than that it never started
         raise
     mistakes.tell()
     said = flown.said

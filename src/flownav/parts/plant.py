@@ -162,7 +162,7 @@ def _rate(here: Array, there: Array) -> Array:
 
 
 class OwnReadings:
-    """Stands before the navigator: what comes of a kind that somebody else's sensor reads is replaced."""
+    """Stands before the navigator: readings of a kind that a user's sensor provides are replaced."""
 
     def __init__(
         self, parts: Sequence[SensorModel], table: Timetable, b: Buffers, then: Take, mistakes: Mistakes

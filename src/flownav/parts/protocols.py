@@ -1,4 +1,4 @@
-"""What a part of one's own must be: plain Python classes with these methods, in one file.
+"""The protocols of a user's own parts: plain Python classes with these methods, in one file.
 
 Everything is in the frames of the rest of flownav: earth NED, body FRD, SI units, Hamilton quaternions body to earth.
 """
@@ -44,20 +44,20 @@ class Reading(NamedTuple):
 
 
 class Told(NamedTuple):
-    """What a filter is told before its first reading.
+    """The settings that a filter is given before its first reading.
 
-    settings: noise, lever arms and gains, as our own navigator is told them.
+    settings: noise, lever arms and gains, as our own navigator gets them.
     """
 
     settings: NavigatorSettings
 
 
 class Estimate(NamedTuple):
-    """What a filter says. Position and velocity NED [m, m/s], attitude (w, x, y, z) body FRD to earth NED.
+    """The estimate of a filter. Position and velocity NED [m, m/s], attitude (w, x, y, z) body FRD to earth NED.
 
     std_pos_ned_m, std_vel_ned_m_s: one standard deviation of each axis, NaN where the filter states none. gyro_bias
-    [rad/s] and accel_bias [m/s2], FRD: what carries the estimate from the horizon to now takes them off the IMU.
-    ground_d_m: down coordinate of the ground below, and pad_ned_m: where the pad is; None while it knows neither.
+    [rad/s] and accel_bias [m/s2], FRD: they are subtracted from the IMU as the estimate is carried from the horizon to
+    now. ground_d_m: down coordinate of the ground below, and pad_ned_m: where the pad is; None while it knows neither.
     """
 
     pos_ned_m: Iterable[float]
@@ -72,10 +72,10 @@ class Estimate(NamedTuple):
 
 
 class Innovation(NamedTuple):
-    """What became of one component of a reading, for the record's innovations (optional).
+    """The innovation of one component of a reading, for the record (optional).
 
-    innovation: observed less predicted; variance: what the filter expects of it, noise and all; component: which of
-    the reading's values; observation: the value that was read.
+    innovation: observed less predicted; variance: the filter's predicted variance of it, measurement noise included;
+    component: which of the reading's values; observation: the value that was read.
     """
 
     innovation: float
@@ -105,15 +105,11 @@ class Filter(Protocol):
         """Take a reading that describes the instant the filter stands at."""
 
     def estimate(self) -> Estimate | None:
-        """What it says now; None until it has started."""
+        """The current estimate; None until it has started."""
 
 
 class Truth(NamedTuple):
-    """What is so at an instant: all that a sensor may read.
-
-    pos_ned_m, vel_ned_m_s (3,); quaternion (4,); rate_frd_rad_s (3,) and force_frd_m_s2 (3,), the mean body rate and
-    specific force over the 20 ms around the instant.
-    """
+    """The true state at an instant: all that a sensor may read."""
 
     t_s: float
     pos_ned_m: Array
@@ -145,7 +141,7 @@ class SensorModel(Protocol):
 
 
 class Outputs(NamedTuple):
-    """What sensors and scores read of a vehicle: rotor thrust [N], load of the ground on it [N], power [W]."""
+    """The outputs of a vehicle for sensors and scores: rotor thrust [N], load of the ground on it [N], power [W]."""
 
     thrust_n: float
     contact_force_n: float
@@ -172,8 +168,8 @@ class VehicleModel(Protocol):
 
 
 class Flown(NamedTuple):
-    """What a controller flies on: position NED from the pad as the vehicle takes it to be, velocity and specific force
-    FRD, attitude as the filter has it, body rates as the flybarless unit's gyros read them.
+    """The state that a controller uses: position NED from the pad as the vehicle takes it to be, velocity and specific
+    force FRD, attitude as the filter has it, body rates as the flybarless unit's gyros read them.
     """
 
     pos_ned_m: Array
@@ -187,7 +183,7 @@ class Flown(NamedTuple):
 class Controller(Protocol):
     """A controller in place of our autopilot's loops, called at 250 Hz.
 
-    When to take off, and that the vehicle has landed, stays with our landing logic, which says it as `flying`.
+    When to take off, and that the vehicle has landed, stays with our landing logic, which states it as `flying`.
     """
 
     def start(self, gains: AutopilotGains) -> None:

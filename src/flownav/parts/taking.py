@@ -27,7 +27,7 @@ from flownav.parts.protocols import Estimate, Filter, Imu, Innovation, Reading, 
 STATED = 3
 QUALITY, ARRIVED, WITHHELD = (READING + MAX_VALUES + STATED + i for i in range(3))
 STALE_S = 0.1  # so long an inertial reading serves
-LARGEST = 1e9  # metres, m/s, rad/s or m/s2 that an estimate may say: chosen, beyond any vehicle's
+LARGEST = 1e9  # metres, m/s, rad/s or m/s2 that an estimate may hold: chosen, beyond any vehicle's
 UNIT_TOLERANCE = 1e-3  # how far a quaternion's length may be from 1
 
 

@@ -1,4 +1,4 @@
-"""What most filters of one's own need: rotations, a level start, the heading of a field, the velocity that flow shows.
+"""Functions that most own filters need: rotations, a level start, the heading of a field, the velocity that flow shows.
 
 Plain NumPy on arrays of three and four; the equations are those of `flownav.core.frames` and of the sensors'
 conventions.
@@ -94,7 +94,7 @@ class AttitudeFollower:
 def gps_variance(s: GpsSettings, alike: float = 10.0) -> Array:
     """Variances NED (3,) [m2] for a filter that takes GPS fixes for white, of a receiver whose errors last.
 
-    So many fixes in a row are `alike`: each counts for one of them. The white part is no smaller than 0.3 m.
+    This number of fixes in a row are `alike`: together they count as one fix. The white part is no smaller than 0.3 m.
     """
     level = s.gps_slow_sigma_m**2 + s.gps_fast_sigma_m**2
     down = s.gps_slow_sigma_down_m**2 + s.gps_fast_sigma_down_m**2

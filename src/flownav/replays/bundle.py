@@ -149,7 +149,7 @@ def _truth(replay: Replay) -> dict[str, Array]:
 
 
 def _events(replay: Replay) -> dict[str, Any]:
-    """What happened, in order of time."""
+    """The events of a replay, in order of time."""
     start, _ = replay.log.span_s
     events = [(start, "replay", "note", note, np.nan) for note in replay.prepared.notes]
     events += [(start, "replay", "warning", finding.text, np.nan) for finding in replay.findings]

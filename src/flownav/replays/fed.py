@@ -39,9 +39,7 @@ def as_fed(
         delay_s = float(log.fed_settings["gps_delay_s"])
         stated = FlowNoise(**{name: float(value) for name, value in noise.items()}) if noise else NO_STATED_NOISE
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(
-            f"{log.path}: it does not say how its navigators were set ({error}); write it again"
-        ) from error
+        raise InputError(f"{log.path}: it lacks the settings of its navigators ({error}); write it again") from error
     recorded = check(told, NavigatorSettingsFile, str(log.path))
     return replace(options, gps_delay_s=delay_s, flow_noise=stated), settings or recorded
 
@@ -52,7 +50,7 @@ def prepared_as_fed(log: Log) -> Prepared:
 
 
 def segments_of(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile) -> list[FedSegment]:
-    """What each navigator of a log or record is fed, and its equipment: as a replay does it, with nothing cut."""
+    """The input of each navigator of a log or record, and its equipment: as a replay does it, with nothing cut."""
     if log.fed:
         return list(log.fed)
     prepared = prepare(log, options)

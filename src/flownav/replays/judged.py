@@ -1,5 +1,5 @@
-"""What a replay is judged by besides its errors: when the vehicle flew, innovations, coverage, sensors that do not
-serve, the autopilot's own estimate, and what a log would lack to be replayed."""
+"""The scores of a replay besides its errors: when the vehicle flew, innovations, coverage, sensors that do not
+serve, the autopilot's own estimate, and the data that a log lacks to be replayed."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -31,15 +31,15 @@ Window = tuple[float, float]
 AIDS = (Sensor.GPS_POSITION, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
 NO_REJECTION = (Reason.FUSED, Reason.DATUM)
 TESTED = (Reason.FUSED, Reason.INNOVATION_GATE)
-# components that a sensor may leave out: a NaN here is nothing told, not a reading that is broken
+# components that a sensor may leave out: a NaN here means not stated, not a reading that is broken
 MAY_BE_LEFT_OUT = ((Sensor.GPS_VELOCITY, 2), (Sensor.FLOW_VELOCITY, 2), (Sensor.PAD, 2))
 LEAST_READINGS = 20  # chosen: 4 s of a 5 Hz receiver
-LEAST_SHARE = 0.2  # chosen: a live session fuses what it heard in its first two seconds, however late
-LATE = Reason.LATE.label  # what a live session's horizon left out never came to the navigator
+LEAST_SHARE = 0.2  # chosen: a live session fuses the readings of its first two seconds, however late
+LATE = Reason.LATE.label  # readings that a live session's horizon left out never reached the navigator
 
 
 def airborne_of(log: Log) -> Window | None:
-    """From the first lift-off to the last touchdown [s]; None where nobody says."""
+    """From the first lift-off to the last touchdown [s]; None where the log does not show it."""
     if Sensor.LANDED in log.streams:
         landed = log.streams[Sensor.LANDED]
         flying = np.flatnonzero(landed.value[:, 0] < 0.5)
@@ -63,7 +63,7 @@ def airborne_of(log: Log) -> Window | None:
 
 
 def flying_at(log: Log, t_s: Array) -> NDArray[np.bool_]:
-    """Which instants (n,) lie in flight, stops on the ground between cut out; all where nobody says."""
+    """Which instants (n,) lie in flight, stops on the ground between cut out; all where the log does not show it."""
     window = airborne_of(log)
     if window is None:
         return np.ones(len(t_s), bool)
@@ -77,7 +77,7 @@ def flying_at(log: Log, t_s: Array) -> NDArray[np.bool_]:
 
 
 def obstacles(log: Log) -> list[str]:
-    """What a replay of the log would lack, one line each; none where it can be replayed."""
+    """The data that the log lacks to be replayed, one line each; none where it can be replayed."""
     found = []
     if Sensor.ATTITUDE not in log.streams and not imu_serves(log.streams):
         slow = Sensor.IMU in log.streams
@@ -91,7 +91,7 @@ def obstacles(log: Log) -> list[str]:
 def consistency_scores(innovation: Array, landed: Stream | None = None) -> dict[str, dict[str, Any]]:
     """By sensor, of the components that were held against their prediction in flight; innovation: rows of a tape's.
 
-    landed: what says when it flies; all of it is flight without.
+    landed: the landed signal; without one all of it is flight.
     """
     offered = InnovationRow.of(innovation)
     tested = np.isin(offered.reason, TESTED)
@@ -120,7 +120,7 @@ def told(innovation: Array) -> Array:
 
 
 def reading_scores(innovation: Array, streams: Mapping[Sensor, Stream]) -> dict[str, dict[str, Any]]:
-    """By sensor, what became of whole readings, where `rejected` counts components; innovation: rows of a tape's.
+    """Counts of whole readings by sensor and outcome, where `rejected` counts components; innovation: rows of a tape's.
 
     offered to the filter; read: these and the rows that the reader threw away; fused: with every component, or with
     some of them (in_part); rejected: readings that lost one component or more, by reason, with the rows that the reader
@@ -173,14 +173,16 @@ def unfused(innovation: Array, streams: Mapping[Sensor, Stream]) -> list[Finding
         why[LATE] += streams[sensor].rejected.get(LATE, 0)
         if why.total() >= LEAST_READINGS and fused < LEAST_SHARE * (fused + why.total()):
             reasons = ", ".join(f"{reason} {count}" for reason, count in why.most_common() if count)
-            heard = f"{sensor.name.lower()} was heard and {'hardly' if fused else 'never'} fused"
+            heard = f"{sensor.name.lower()} was received and {'hardly' if fused else 'never'} fused"
             text = f"{heard} ({fused} readings; {reasons}): the estimate rests on the other sensors"
             found.append(Finding(text, unfused=True))
     return found
 
 
 def placed_here(log: Log, gps_delay_s: float, t_s: Array, position: Array) -> Alignment | None:
-    """What puts the autopilot's frame into ours, t_s (n,) and position (n, 3); None without an estimate of its own."""
+    """The alignment of the autopilot's frame with ours, t_s (n,) and position (n, 3); None without an estimate of its
+    own.
+    """
     return None if log.autopilot is None else placed_in(t_s, position, log.autopilot, _gps(log, gps_delay_s))
 
 
@@ -193,9 +195,9 @@ def autopilot_path(log: Log, placed: Alignment | None) -> Table | None:
 
 
 def setpoints(log: Log, placed: Alignment | None) -> Table | None:
-    """What the autopilot asked for in the frame of ours (`placed_here`): one table, NaN where it was not asked.
+    """The autopilot's set-points in our frame (`placed_here`): one table, NaN where there is none.
 
-    Columns as record.TABLES["setpoint"]; None without any. With nothing that tells how the frames lie there is no
+    Columns as record.TABLES["setpoint"]; None without any. Where the relation of the frames is unknown there is no
     position, and the attitude is as the log has it.
     """
     turned = Alignment(0.0, (0.0, 0.0, 0.0)) if placed is None else placed

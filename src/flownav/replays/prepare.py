@@ -37,7 +37,7 @@ HELD_S = 0.5
 
 @dataclass(frozen=True)
 class ReplayOptions:
-    """What a user may ask of a replay."""
+    """The user's options of a replay."""
 
     gps_delay_s: float = 0.22  # ArduPilot's default lag of a u-blox
     gps_outages_s: tuple[tuple[float, float], ...] = ()
@@ -153,7 +153,7 @@ def check_windows(log: Log, windows: Iterable[tuple[float, float]], option: str)
 
 # -- on the ground -----------------------------------------------------------------------------------------
 def held(landed: Stream, end_s: float) -> Stream:
-    """Landed is a state until take-off: a log that tells the change alone says it again every HELD_S, up to its end.
+    """Landed is a state until take-off: of a log with the change alone it is repeated every HELD_S, up to its end.
 
     Without it a vehicle that stands with its motors running, and has neither GPS nor flow there, runs away.
     """
@@ -191,7 +191,7 @@ def _scaled(stream: Stream, scale: tuple[float, float]) -> Stream:
 
 
 def put_right(stream: Stream, identified: IdentifiedFlow) -> Stream:
-    """The stream in the vehicle's axes: those of a sensor that is turned or wired otherwise, as its file says."""
+    """The stream in the vehicle's axes: for a sensor that is turned or wired otherwise, by its file."""
     angular = stream.sensor == Sensor.FLOW_RATE
     return replace(stream, value=in_vehicle_axes(stream.value, identified, angular=angular))
 
@@ -266,7 +266,7 @@ def _gyro_candidates(flow: Stream, streams: dict[Sensor, Stream], by_imu: Array 
 def _followed(flow: Stream, difference: Array) -> Array:
     """A first-order low-pass of a gyro's difference from the attitude's rates: its bias, as known at each instant.
 
-    A reading of no data (quality 0) may hold zeros for its gyro too, and says nothing of it.
+    A reading of no data (quality 0) may hold zeros for its gyro too, and is left out.
     """
     good = flow.quality != 0.0
     gain = 1.0 - np.exp(-np.diff(flow.t_s, prepend=flow.t_s[0]) / GYRO_BIAS_TIME_S)
@@ -278,7 +278,7 @@ def _followed(flow: Stream, difference: Array) -> Array:
 
 @kernel
 def _low_pass(value: Array, gain: Array, followed: Array) -> None:
-    """y += gain (value - y), column by column; value and what comes of it (n, k), gain (n,)."""
+    """y += gain (value - y), column by column; value and result (n, k), gain (n,)."""
     for column in range(value.shape[1]):
         state = 0.0
         for row in range(value.shape[0]):

@@ -5,7 +5,7 @@ the least sample-to-sample noise. And the compensated flow times range, turned b
 velocity: as complex numbers (north + i east) their correlation has a size (do they belong together) and an angle
 (the heading's error); moved against each other in time, it peaks at the clock's error.
 
-Only what is beyond doubt is said: where the vehicle moves too little, or GPS is away, nothing is.
+Only findings beyond doubt are reported: where the vehicle moves too little, or GPS is away, there is none.
 """
 
 from collections.abc import Iterable
@@ -18,11 +18,11 @@ from flownav.core.frames import rotation_from_quaternion, velocity_from_flow
 from flownav.core.measurement import COLUMNS, Array, Sensor, Stream
 from flownav.logs.log import attitude_at, mean_over
 
-# Chosen so that nothing is said of quad-px4flow-outdoor, whole or in any part of 30 to 120 s, and each of its twelve
+# Chosen so that nothing is found in quad-px4flow-outdoor, whole or in any part of 30 to 120 s, and each of its twelve
 # spoilt copies is found out (test_replay_sentinel). Halving or doubling any one of them changes no verdict on nine such
 # parts and eleven copies, but for LEAST_OVERLAP, which beyond 1 silences all; that of the climb has but 40 intervals.
 MOVING_M_S = 1.0
-LEAST_MOVING_S = 10.0  # take-off and hover, 12 s of that log, say nothing
+LEAST_MOVING_S = 10.0  # take-off and hover, 12 s of that log, show nothing
 LEAST_MOVING_FOR_LAG_S = 20.0
 LEAST_PAIRS = 30
 SMOOTHING_S = 0.6
@@ -61,8 +61,8 @@ TURNS = tuple(reading for reading in READINGS if reading[0][1] * reading[1][0] <
 
 
 class Finding(NamedTuple):
-    """What is wrong with a log, and how it is called. Two kinds are a bad verdict: the flow itself is wrong, or a
-    horizontal sensor was heard and never fused.
+    """An error found in a log, and its name. Two kinds are a bad verdict: the flow itself is wrong, or a horizontal
+    sensor was received and never fused.
     """
 
     text: str
@@ -89,7 +89,9 @@ class Fit(NamedTuple):
 
 
 def findings(streams: dict[Sensor, Stream], gps_outages_s: Iterable[tuple[float, float]]) -> list[Finding]:
-    """What GPS says about the flow, the heading, the clock and its own climb rate. `streams` with their delays."""
+    """The findings that GPS shows about the flow, the heading, the clock and its own climb rate. `streams` with their
+    delays.
+    """
     heard: dict[Sensor, Stream] = {
         sensor: _kept(streams[sensor], gps_outages_s)
         for sensor in (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
@@ -129,7 +131,7 @@ def _of_flow(course: Course, flow: Stream, streams: dict[Sensor, Stream]) -> lis
 
 
 def _of_heading_and_clock(fits: tuple[Fit, ...]) -> list[str]:
-    """What the simplest explanation that serves says: nothing wrong, one thing, or both."""
+    """The words of the simplest explanation that fits: nothing wrong, one error, or both."""
     enough = SLACK[0] * min(fit.unexplained for fit in fits) + SLACK[1]
     as_it_is, turned, late, both = fits
     if as_it_is.unexplained <= enough:
@@ -149,7 +151,7 @@ def _words(fit: Fit) -> str:
         words.append(f"heading is off by about {degrees:.0f} deg (the logged yaw lies {side} the course by GPS)")
     if abs(fit.clock_s) >= LEAST_CLOCK_ERROR_S:
         late = "late" if fit.clock_s > 0 else "early"
-        words.append(f"GPS clock is {late} by about {abs(fit.clock_s):.1f} s (beyond the delay that is told)")
+        words.append(f"GPS clock is {late} by about {abs(fit.clock_s):.1f} s (beyond the stated delay)")
     return " and ".join(words)
 
 
@@ -249,7 +251,9 @@ def _velocity(reading: Matrix, flow: Stream, streams: dict[Sensor, Stream], cour
 
 
 def _rotation_noise(flow: Stream) -> dict[Matrix, float]:
-    """What each reading leaves of the rotation in the flow: its sample-to-sample noise, all alike for a velocity."""
+    """The sample-to-sample noise that each reading of the axes leaves when rotation is removed; all alike for a
+    velocity.
+    """
     if flow.sensor != Sensor.FLOW_RATE:
         return dict.fromkeys(READINGS, 1.0)
     squares = {}

@@ -58,7 +58,7 @@ class Replay:
 
     @property
     def innovation(self) -> Array:
-        """What became of each component: rows of `navigation.rows.InnovationRow`."""
+        """The verdict on each component: rows of `navigation.rows.InnovationRow`."""
         return self.written.innovation
 
     @property
@@ -68,7 +68,7 @@ class Replay:
 
     @property
     def offered(self) -> InnovationRow[Array]:
-        """The columns of what became of each component."""
+        """The columns of the verdicts on each component."""
         return InnovationRow.of(self.innovation)
 
     @cached_property
@@ -78,7 +78,7 @@ class Replay:
 
     @cached_property
     def findings(self) -> list[Finding]:
-        """What is wrong with the log, as far as its sensors show, and whether anything was fused at all."""
+        """The errors of the log that its sensors show, and whether anything was fused at all."""
         fused = self.offered.sensor[self.offered.reason == Reason.FUSED]
         found = findings({Sensor.ATTITUDE: self.attitude, **self.prepared.streams}, self.options.gps_outages_s)
         if not np.isin(fused, HORIZONTAL).any():
@@ -95,7 +95,7 @@ class Replay:
 
     @cached_property
     def references(self) -> scored.References:
-        """What the log knows that the path is scored against."""
+        """The references in the log that the path is scored against."""
         return references_of(self.log, self.options)
 
     @cached_property
@@ -113,7 +113,7 @@ class Replay:
         return scored.outage_of(scored.path_of(self.table), self.references, t0, t1)
 
     def rejected(self) -> dict[str, dict[str, int]]:
-        """What was not fused, by sensor and reason: rows by the reader, components by the filter, added up."""
+        """Counts of rejections by sensor and reason: rows by the reader, components by the filter, added up."""
         counts = {}
         offered = InnovationRow.of(judged.told(self.innovation))
         sensors, reasons = offered.sensor.astype(int), offered.reason.astype(int)
@@ -125,7 +125,7 @@ class Replay:
         return counts
 
     def scores(self) -> dict[str, Any]:
-        """What `--json` prints, but for the outage table and the record's path."""
+        """The output of `--json`, except the outage table and the record's path."""
         start, end = self.log.span_s
         warned = flagged(self.said.t_s, flags_of(self.written.event))
         scores: dict[str, Any] = {
@@ -144,7 +144,7 @@ class Replay:
 
 
 def references_of(log: Log, options: ReplayOptions) -> scored.References:
-    """What a log knows of its flight: its GPS, withheld or not, and its truth."""
+    """The references in a log: its GPS, withheld or not, and its truth."""
     fixes, speeds = (log.streams.get(sensor) for sensor in GPS)
     return scored.References(
         fixes=None if fixes is None else (fixes.t_s, fixes.value),

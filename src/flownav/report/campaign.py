@@ -73,14 +73,14 @@ def sections(summary: dict[str, Any], touchdowns: Sequence[Touchdowns]) -> list[
         ("sweep", "Over what is swept", swept),
         ("spread", "How far off, and how sure", [tails, figures.convergence(cells[:MOST_CELLS])]),
         ("wind", "The wind that they landed in", winds),
-        ("inputs", "What matters", inputs),
+        ("inputs", "Inputs that matter", inputs),
     ]
     drawn = [(key, title, tuple(panel for panel in panels if panel is not None)) for key, title, panels in parts]
     return [Section(key, title, panels) for key, title, panels in drawn if panels]
 
 
 def facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
-    """What was flown."""
+    """The campaign's facts as (name, value) rows."""
     models = dict.fromkeys(cell["truth_model"] for cell in summary["cells"])
     found = {"flights": f"{summary['flights']:,}", "cells": str(len(summary["cells"])), "seed": str(summary["seed"])}
     found |= {"truth": " and ".join(models), "sampling": summary["sampling"]}
@@ -205,9 +205,9 @@ def sections_of(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> list[Sect
     ]
     distribution = [certificate_figures.touchdowns(facts, shown), *(panel for panel in tails if panel.drawing)]
     return [
-        Section("distribution", "What the flights did", tuple(widened(distribution))),
+        Section("distribution", "Figures of the flights", tuple(widened(distribution))),
         Section("envelope-map", "Under which conditions", (certificate_figures.envelope(facts),)),
-        Section("sensitivity", "What decides the outcome", tuple(certificate_figures.ranking(facts))),
+        Section("sensitivity", "Inputs that decide the outcome", tuple(certificate_figures.ranking(facts))),
     ]
 
 
@@ -233,7 +233,7 @@ CHOSEN = {
 
 
 def chosen(facts: Mapping[str, Any]) -> list[str]:
-    """What was chosen by hand that a certificate can be had without, in sentences."""
+    """The choices by hand that a certificate does not need, in sentences."""
     given = {name: facts["chosen"][name] for name in CHOSEN}
     return [CHOSEN[name].format(value) for name, value in given.items() if value is not None]
 

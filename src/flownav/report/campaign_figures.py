@@ -1,4 +1,4 @@
-"""The figures of a campaign's page and of an envelope's, from what its summary says and where its flights touched."""
+"""The figures of a campaign's page and of an envelope's, from its summary and its flights' touchdowns."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -116,9 +116,7 @@ def convergence(cells: Sequence[dict[str, Any]]) -> Panel | None:
     what = "R95 at contact" if lands else "p95 of the largest error of one axis"
     look = layout(360) | {"xaxis": axis("flights") | {"type": "log", "dtick": 1}}
     look["yaxis"] = axis(f"{what} (m)") | {"rangemode": "tozero"}
-    words = (
-        "Solid: the figure after so many flights; dotted: its 95 % interval, which does not allow for looking often."
-    )
+    words = "Solid: the figure after each number of flights; dotted: its 95 % interval, not widened for repeated looks."
     alt = f"{what} against the number of flights"
     return Panel("convergence", "How it settled", words, alt, drawing(data, look))
 
@@ -208,7 +206,7 @@ def sensitivity(key: str, cell: dict[str, Any]) -> Panel | None:
 
 
 def swept_numbers(cells: Sequence[dict[str, Any]]) -> list[str]:
-    """What is swept over at least three numbers."""
+    """The names that are swept over at least three numbers."""
     names = dict.fromkeys(name for cell in cells for name in cell["values"])
     numbers = {name: {value for cell in cells if isinstance(value := cell["values"][name], float)} for name in names}
     return [name for name, values in numbers.items() if len(values) >= 3]

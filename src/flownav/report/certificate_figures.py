@@ -229,7 +229,7 @@ def ranking(facts: Mapping[str, Any]) -> list[Panel]:
     if sum(row["total"] for row in facts["ranking"]) > LEAST_JOINT_INDEX:
         caption += (
             " The totals add up to far more than 1: inputs act together, and with the noise, which acts otherwise after"
-            " a small change of any. Then the first indices say what helps."
+            " a small change of any. Then the first indices show what helps."
         )
     bars = [dict(row) | {"name": _broken(row["input"])} for row in facts["ranking"][:MOST_BARS]]
     split = [dict(row) | {"name": KNOWN_WORDS[row["known"]]} for row in facts["split"]]

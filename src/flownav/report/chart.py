@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from flownav.core.measurement import Array
 from flownav.report.series import Moment, Window
 
-LINE_POINTS = 2700  # a drawn line has at most so many points
-DOT_POINTS = 900  # a cloud of readings so many dots
-CROSS_POINTS = 250  # and the exceptional ones so many crosses
+LINE_POINTS = 2700  # a drawn line has at most this number of points
+DOT_POINTS = 900  # a cloud of readings this number of dots
+CROSS_POINTS = 250  # and the exceptional ones this number of crosses
 
 
 def thin(budget: int, *columns: Array) -> NDArray[np.int64]:
@@ -136,7 +136,7 @@ class Chart:
     row_height_px: int = ROW_HEIGHT_PX
 
     def names(self) -> list[str]:
-        """What is drawn, each name once, in the order of drawing."""
+        """The drawn names, each once, in the order of drawing."""
         return list(dict.fromkeys(one.name for axis in self.axes for one in axis.series))
 
 
@@ -149,7 +149,7 @@ class Stack:
 
     @property
     def names(self) -> list[str]:
-        """What is drawn so far, each name once."""
+        """The names drawn so far, each once."""
         return Chart(tuple(self._axes), (0.0, 0.0)).names()
 
     def _add(self, row: int, one: Series) -> None:

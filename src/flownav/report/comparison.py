@@ -164,7 +164,7 @@ def _differences(named: Named, errors: Errors, window: Window) -> list[Panel]:
 
 
 def _together(named: Named) -> Paths | None:
-    """What flew in each record as one set of paths, the first record's last, so that it stands for the vehicle."""
+    """The paths of all records as one set, the first record's last, so that it stands for the vehicle."""
     found = [(k, name, paths) for k, (name, record) in enumerate(named) if (paths := paths_of(record)) is not None]
     if not found:
         return None

@@ -25,14 +25,14 @@ KINDS = {
 
 
 def title(record: Record) -> str:
-    """What flew, as a heading: the scenario's (or the log's) name."""
+    """The heading of a report: the scenario's (or the log's) name."""
     name = record.manifest.get("scenario") or record.manifest.get("log") or record.manifest.get("kind") or "Flight"
     words = PurePath(str(name)).name.removesuffix(".toml").replace("_", " ").replace("-", " ").strip() or "Flight"
     return words[0].upper() + words[1:]
 
 
 def duration_s(record: Record) -> float:
-    """The flight's length [s]: as the manifest says, or else as its estimate lasts."""
+    """The flight's length [s]: by the manifest, or else of its estimate."""
     stated = record.manifest.get("duration_s")
     start, end = series.whole_s(record)
     return float(stated) if isinstance(stated, (int, float)) else end - start
@@ -53,7 +53,7 @@ def summary(record: Record) -> str:
         ever = "In flight no axis of the position that the autopilot used was" if has(record, "flown") else ever
         said.append(f"{ever} off by more than {metres(largest)} m{beside}.")
     if manifest.get("known_exactly"):
-        said.append(f"What the vehicle knew exactly: {manifest['known_exactly']}.")
+        said.append(f"Known to the vehicle without error: {manifest['known_exactly']}.")
     cut = series.scored_outages(record)
     if cut:
         worst = max(cut, key=series.rms_m)
@@ -85,7 +85,7 @@ def summary(record: Record) -> str:
 
 
 def _reference(record: Record) -> str:
-    """What errors are taken against, in words: a truth, or an estimate that serves for want of one."""
+    """The reference of the errors, in words: a truth, or an estimate that serves for want of one."""
     name = series.truth_name(record)
     return "the recorded truth" if name == "truth" else f"the recorded {name} (an estimate itself)"
 
@@ -129,7 +129,7 @@ def tiles(record: Record) -> list[Tile]:
 
 
 def _axis_of_largest(scores: Mapping[str, Any]) -> str:
-    """Which axis of the position erred most, as words to follow; "" where the scores do not say."""
+    """Which axis of the position erred most, as words to follow; "" where the scores lack it."""
     states = mapping(scores.get("states"))
     errors = {words: mapping(states.get(key)).get("max_error") for key, words in AXES.items()}
     known = {words: float(value) for words, value in errors.items() if isinstance(value, int | float)}
@@ -147,7 +147,7 @@ def flow_share(record: Record) -> float | None:
 
 
 def explained(record: Record) -> dict[str, Any]:
-    """What `flownav explain` said of the log: verdict, causes, headings and lines of its table; empty without it."""
+    """The output of `flownav explain` on the log: verdict, causes, headings and lines of its table; {} without."""
     told = mapping(record.manifest.get("explained"))
     if not isinstance(told.get("verdict"), str):
         return {}
@@ -159,7 +159,7 @@ def explained(record: Record) -> dict[str, Any]:
 
 
 def lacking(record: Record) -> list[str]:
-    """What the record does not hold, in words, and what the report can therefore not show."""
+    """The data that a record lacks, in words, and the figures that its report therefore cannot show."""
     notes = []
     covered = record.manifest.get("covered_fraction", 1.0)
     if covered < 0.99:
@@ -216,7 +216,7 @@ def landing_sentences(landing: Mapping[str, Any]) -> list[str]:
 
 
 def parts_of(limited: Mapping[str, Any]) -> tuple[Part, ...]:
-    """What the touchdown's place was limited by, as bars; they add as vectors. None where it was not scored."""
+    """The parts of the touchdown's error as bars; they add as vectors. None where it was not scored."""
     sizes = {name: limited.get(f"{name}_m") for name in ("estimate", "guidance", "pad")}
     known = {name: float(size) for name, size in sizes.items() if isinstance(size, (int, float)) and size == size}
     longest = max(known.values(), default=0.0)

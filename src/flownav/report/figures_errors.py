@@ -43,7 +43,7 @@ def close_ups(record: Record) -> list[Panel]:
         panels.append(position(record, View("outage-position", "GPS outage: position", window)))
         panels.append(velocity(record, View("outage-velocity", "GPS outage: velocity", window)))
     if not panels:
-        why = "The record tells of no lift-off, no touchdown and no GPS outage."
+        why = "The record shows no lift-off, no touchdown and no GPS outage."
         panels.append(Panel("no-moments", "Take-off and landing", absent=why))
     return panels
 
@@ -99,7 +99,8 @@ def _reach(values: Array, band: Array) -> float:
 
 
 def from_first_fix(record: Record) -> list[Panel]:
-    """Errors of what was flown on from the first fix of the pad to just after the touchdown; none without a fix.
+    """Errors of the estimate used by the autopilot, from the first fix of the pad to just after the touchdown; none
+    without a fix.
 
     Before the fix the vehicle takes its pad to be where GPS and the scenario put it, metres off; after it the errors
     are those of the landing, and have an axis of their own.
@@ -123,7 +124,7 @@ def from_first_fix(record: Record) -> list[Panel]:
 
 
 def _error_of(record: Record, role: str, columns: tuple[str, ...], window: Window | None = None) -> Track | None:
-    """What a table says of these states less the truth, in a window; None where either says nothing of them."""
+    """A table's states less the truth, in a window; None where either lacks them."""
     source, truth = track(record, role, columns), track(record, "truth", columns)
     return None if source is None or truth is None else series.difference(source, truth).within(window)
 
@@ -137,7 +138,9 @@ def _drawn(record: Record, role: str, titles: tuple[str, ...], error: Track) -> 
 
 
 def landing_errors(record: Record, moment: Moment, window: Window) -> list[Panel]:
-    """Errors of position and velocity about a moment, of what was flown on or else of the estimate; none without."""
+    """Errors of position and velocity about a moment, of the estimate used by the autopilot or else of the navigator's;
+    none without.
+    """
     role = "flown" if has(record, "flown") else "estimate"
     panels = []
     for columns, titles, what, unit in ERRORS:
@@ -154,7 +157,9 @@ def landing_errors(record: Record, moment: Moment, window: Window) -> list[Panel
 
 
 def flown_errors(record: Record) -> list[Panel]:
-    """Errors of what an autopilot flew on, the estimate of now from where the pad is taken to be; none without."""
+    """Errors of the estimate used by the autopilot at present, relative to the believed place of the pad; none
+    without.
+    """
     panels = []
     for columns, titles, what, _ in ERRORS:
         error = _error_of(record, "flown", columns)
@@ -162,7 +167,7 @@ def flown_errors(record: Record) -> list[Panel]:
             return []
         figure = _drawn(record, "flown", titles, error).chart(series.start_end_s(record), moments(record))
         title = f"Autopilot's input: {what} error"
-        caption = "Until the hand-over the vehicle stands, or flies on the truth: no error, by definition."
+        caption = "Until the hand-over the vehicle stands, or the autopilot uses the truth: no error, by definition."
         panels.append(Panel(f"flown-{what}-error", title, caption, f"{title} over time: {', '.join(titles)}.", figure))
     return panels
 

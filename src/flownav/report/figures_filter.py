@@ -1,4 +1,4 @@
-"""How good the filter says it is: radius of uncertainty (figure 31), normalised errors, protection levels."""
+"""The filter's stated accuracy: radius of uncertainty (figure 31), normalised errors, protection levels."""
 
 import numpy as np
 

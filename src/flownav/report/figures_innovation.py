@@ -184,7 +184,7 @@ GROUPS = (
     Group(
         "gyro-bias",
         "Gyro bias",
-        "What the filter takes the gyro's bias to be, and three of its standard deviations.",
+        "The filter's estimate of the gyro's bias, and three of its standard deviations.",
         tuple(_one(f"{a} (°/s)", f"gyro_bias_{a}_rad_s", "bias", DEGREES) for a in "xyz"),
     ),
     Group(
@@ -196,7 +196,7 @@ GROUPS = (
     Group(
         "gps-errors",
         "Error of the GPS position",
-        "What the filter takes the receiver's error to be: a part that wanders for minutes and one for seconds.",
+        "The filter's estimate of the receiver's error: a part that wanders for minutes and one for seconds.",
         tuple(
             (f"{title} (m)", 1.0, ((f"gps_slow_{a}_m", "slow part", "estimate"), (f"gps_fast_{a}_m", FAST_PART, "gps")))
             for title, a in EARTH
@@ -205,7 +205,7 @@ GROUPS = (
     Group(
         "gps-velocity-errors",
         "Error of the GPS velocity",
-        "What the filter takes the receiver's velocity to be off by.",
+        "The filter's estimate of the receiver's velocity error.",
         tuple(_one(f"{title} (m/s)", f"gps_velocity_{a}_m_s", "error") for title, a in EARTH),
     ),
     Group(

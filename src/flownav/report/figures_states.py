@@ -201,7 +201,7 @@ def battery(record: Record) -> list[Panel]:
     return [Panel("battery", "Battery", caption, f"Battery over time. {caption}", chart)]
 
 
-JUMP_M = 0.5  # from one row to the next: what is flown on jumps so far as a pad is found
+JUMP_M = 0.5  # from one row to the next: the estimate in use jumps this far as a pad is found
 
 
 class Pad(NamedTuple):
@@ -218,7 +218,9 @@ class Pad(NamedTuple):
 
 @dataclass(frozen=True)
 class Paths:
-    """What moved where: (role, name, track NED [m]) with the truth last, GPS readings, the pad, the touchdown (3,)."""
+    """The paths that are drawn: (role, name, track NED [m]) with the truth last, GPS readings, the pad, the touchdown
+    (3,).
+    """
 
     tracks: tuple[tuple[str, str, Track], ...]
     gps: Track | None
@@ -231,7 +233,7 @@ class Paths:
         return self.tracks[-1]
 
     def names(self) -> list[str]:
-        """What is drawn, in words."""
+        """The names of the drawn paths and places."""
         gps, where = ["GPS"] * (self.gps is not None), ["pad"] * (self.pad is not None)
         return [*where, *gps, *(name for _, name, _ in self.tracks), *["touchdown"] * (self.touch is not None)]
 
@@ -268,7 +270,7 @@ def _touchdown(record: Record, path: Track) -> Array | None:
 
 
 def drawn_rows(role: str, path: Track) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Rows of a path that are drawn, and places among them before which it is open, as what is flown on jumps."""
+    """Rows of a path that are drawn, and places among them before which it is open, as the estimate in use jumps."""
     steps = np.linalg.norm(np.diff(path.value, axis=0), axis=1) if role == "flown" else np.zeros(0)
     jumps = np.flatnonzero(steps > JUMP_M) + 1
     kept = np.union1d(thin(LINE_POINTS, *path.value.T), np.concatenate([jumps - 1, jumps]))

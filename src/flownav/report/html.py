@@ -146,7 +146,7 @@ def render(record: Record) -> str:
 
 
 def linked_with(shown: list[Section], facts: dict[str, Any], paths: Paths | None, window: Window) -> dict[str, Any]:
-    """What a page whose panels share an instant is given: sections, their data once, style, scripts, content policy."""
+    """The context of a page whose panels share an instant: sections, data once, style, scripts, content policy."""
     from markupsafe import Markup
 
     scripts = [(HERE / name).read_text(encoding="utf-8") for name in RECORD_SCRIPTS]
@@ -170,7 +170,7 @@ def linked_with(shown: list[Section], facts: dict[str, Any], paths: Paths | None
 
 
 def flight_facts(record: Record, found: Sequence[Phase]) -> dict[str, Any]:
-    """What all panels share: the window, the phases, moments and outages, and the instant to begin with.
+    """The data that all panels share: the window, phases, moments and outages, and the instant to begin with.
 
     That is the touchdown, or else the end.
     """
@@ -197,7 +197,7 @@ def heights_px(charts: Mapping[str, Any]) -> dict[str, int]:
 
 
 def drawn_with(shown: Sequence[Section]) -> dict[str, Any]:
-    """What every page with figures is given: its sections, their data, colours, style, scripts and content policy."""
+    """The context of a page with figures: its sections, their data, colours, style, scripts and content policy."""
     from markupsafe import Markup
 
     plotly, own = plotly_script(), (HERE / "page.js").read_text(encoding="utf-8")

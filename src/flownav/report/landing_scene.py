@@ -1,4 +1,4 @@
-"""What a picture of a landing shows: where the vehicle was, what the navigator stated of it, pad, touchdown, wind."""
+"""The content of a landing's picture: the vehicle's path, the navigator's estimate, pad, touchdown, wind."""
 
 from collections.abc import Mapping, Sequence
 from math import isfinite
@@ -30,7 +30,7 @@ class Course(NamedTuple):
 
 
 class Scene(NamedTuple):
-    """What the picture shows; along: the heading [rad] that the side view has to its right.
+    """The content of the picture; along: the heading [rad] that the side view has to its right.
 
     ways: the drawn paths of truth and estimate; three_sigma_m: what the filter states along the second, NED, (n, 3),
     NaN where it states nothing.
@@ -57,7 +57,7 @@ class Scene(NamedTuple):
 
 
 def scene_of(record: Record) -> Scene | None:
-    """What there is to draw; None without a touchdown, a truth and an estimate with attitude beside it."""
+    """The scene of a record; None without a touchdown, a truth and an estimate with attitude."""
     contact = mapping(mapping(mapping(record.manifest.get("scores")).get("touchdown")).get("contact"))
     said = "flown" if has(record, "flown", (*POSITION_NED, *QUATERNION)) else "estimate"
     known = all(has(record, name, (*POSITION_NED, *QUATERNION)) for name in ("truth", said))
@@ -86,7 +86,7 @@ def scene_of(record: Record) -> Scene | None:
 
 
 def _numbers(said: Mapping[str, Any], names: Sequence[str]) -> dict[str, float]:
-    """Those of the names that say a finite number: a manifest comes from a file."""
+    """The finite numbers among these entries: a manifest comes from a file."""
     found = {name: said.get(name) for name in names}
     return {name: float(value) for name, value in found.items() if isinstance(value, int | float) and isfinite(value)}
 

@@ -24,7 +24,7 @@ def plotly() -> Any:
 
 @dataclass(frozen=True)
 class Part:
-    """What a large figure is made of: its name, its value as text, its length as a share of the longest part."""
+    """A part of a large figure: its name, its value as text, its length as a share of the longest part."""
 
     name: str
     value: str
@@ -80,14 +80,14 @@ class Panel:
 
     @property
     def still(self) -> Any:
-        """What stands in the page as it is, marked as safe for it; None of other drawings."""
+        """A still drawing, marked as safe for the page; None of other drawings."""
         from markupsafe import Markup
 
         return Markup(self.drawing.svg) if isinstance(self.drawing, Still) else None
 
     @cached_property
     def drawn(self) -> Drawing | None:
-        """What Plotly's script draws; a chart is turned into that. None of what is drawn otherwise, and of nothing."""
+        """A drawing for Plotly's script; a chart is turned into one. None of any other drawing, and of none."""
         if isinstance(self.drawing, Chart):
             return figure(self.drawing)
         return self.drawing if isinstance(self.drawing, Drawing) else None

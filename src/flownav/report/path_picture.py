@@ -48,7 +48,7 @@ def _within(path: Track, window: Window) -> Track:
 
 
 def _main(shown: list[tuple[str, str, Track]]) -> Track | None:
-    """What the dot moves along: the estimate, or else the last of what there is."""
+    """The path along which the dot moves: the estimate, or else the last one drawn."""
     order = [path for role, _, path in shown if role == "estimate"] + [path for *_, path in reversed(shown)]
     return order[0] if order else None
 
@@ -128,7 +128,7 @@ def _ends(path: Track) -> Window:
 
 
 def _even(path: Track, count: int) -> Track:
-    """At most so many rows of a path, even in time."""
+    """At most `count` rows of a path, even in time."""
     if len(path.t_s) <= count:
         return path
     rows = np.unique(np.searchsorted(path.t_s, np.linspace(*_ends(path), count)))

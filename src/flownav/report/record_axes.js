@@ -1,4 +1,4 @@
-// What a row of a panel holds: its lines on one time base for uPlot, how far its axis reaches, where a logarithmic one is marked.
+// The content of a row of a panel: its lines on one time base for uPlot, how far its axis reaches, where a logarithmic one is marked.
 "use strict";
 const axes = (() => {
   function pausesOf(times) {

@@ -68,7 +68,7 @@ const flight = (() => {
   const styles = getComputedStyle(document.documentElement);
   const colour = (role) => styles.getPropertyValue(`--${role}`).trim();
 
-  // What the whole page shares. `moved`: somebody chose the instant. `follow` is called with it, `fit` when the zoom changes.
+  // The state that the whole page shares. `moved`: somebody chose the instant. `follow` is called with it, `fit` when the zoom changes.
   const shared = { t: 0, moved: false, zoom: null, followers: [], fitters: [], pending: false };
   function setInstant(t) {
     const { t0, t1 } = shared.facts;

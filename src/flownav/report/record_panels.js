@@ -24,7 +24,7 @@ const panels = (() => {
       this.plots = [];
     }
 
-    // What is in sight: the page's zoom; of a close-up what of it lies in its own stretch, or else all of that.
+    // The visible window: the page's zoom; of a close-up the part of it in its own stretch, or else all of that.
     window() {
       const own = this.spec.window;
       const { zoom } = flight;

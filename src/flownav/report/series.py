@@ -1,4 +1,4 @@
-"""What the figures draw, taken out of a record's tables: interpolation, rotation, moments."""
+"""The data of the figures, taken from a record's tables: interpolation, rotation, moments."""
 
 from __future__ import annotations
 
@@ -59,14 +59,14 @@ def track(record: Record, table: str, columns: tuple[str, ...]) -> Track | None:
 
 
 def estimates(record: Record, columns: tuple[str, ...]) -> list[tuple[str, str, Track]]:
-    """Everything that says these states, as (role, name, track), the truth last and so on top."""
+    """All tables with these states, as (role, name, track), the truth last and so on top."""
     names = dict(ESTIMATES) | {"truth": truth_name(record)}
     found = [(role, name, track(record, role, columns)) for role, name in names.items()]
     return [(role, name, source) for role, name, source in found if source is not None]
 
 
 def setpoints(record: Record, columns: tuple[str, ...]) -> Track | None:
-    """What an autopilot asked for of these states, where it did; None where it never did."""
+    """The autopilot's set-points of these states, where it had any; None where it never did."""
     asked = track(record, "setpoint", columns)
     if asked is None:
         return None
@@ -75,7 +75,7 @@ def setpoints(record: Record, columns: tuple[str, ...]) -> Track | None:
 
 
 def truth_name(record: Record) -> str:
-    """What the record's reference is to be called: "truth", or what it is where it is none (visual odometry)."""
+    """The name of the record's reference: "truth", or another estimate's name (visual odometry)."""
     stated = str(record.manifest.get("truth_name") or "")
     return "truth" if stated in TRUTHS else stated
 
@@ -231,7 +231,7 @@ def _text(cell: Any) -> str:
 
 
 def start_end_s(record: Record) -> Window:
-    """What the axes show [s]: the flight, to AFTER_REST_S after a scored landing came to rest."""
+    """The time span of the axes [s]: the flight, to AFTER_REST_S after a scored landing came to rest."""
     start, end = whole_s(record)
     landing = mapping(mapping(record.manifest.get("scores")).get("touchdown"))
     rest_s = mapping(landing.get("rest")).get("t_s")

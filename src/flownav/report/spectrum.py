@@ -17,7 +17,7 @@ ROWS = (("accel_m_s2_rt_hz", "accelerometer (m/s²/√Hz)", "m/s²"), ("gyro_deg
 
 
 def spectrum(record: Record) -> list[Panel]:
-    """Densities over frequency, with the largest line of each named; none where no inertial readings tell them."""
+    """Densities over frequency, with the largest line of each named; none without inertial readings."""
     found = mapping(record.manifest.get("vibration")) or _of_imu(record)
     frequency = _numbers(found, "frequency_hz")
     rows = [(title, unit, _numbers(found, key)) for key, title, unit in ROWS]
@@ -44,7 +44,7 @@ def _of_imu(record: Record) -> Mapping[str, Any]:
 
 
 def _numbers(found: Mapping[str, Any], key: str) -> Array:
-    """Finite positive numbers of a manifest; none where it says something else."""
+    """Finite positive numbers of a manifest; none where it holds something else."""
     values = found.get(key)
     if not isinstance(values, list) or not all(isinstance(one, float) for one in values):
         return np.zeros(0)

@@ -44,7 +44,7 @@ PALETTE: dict[str, tuple[str, str]] = {
     "gps": ("#bf5b0b", "#f2a354"),
     "flow": ("#0e7a5f", "#45cfa2"),
     "autopilot": ("#8339a8", "#cb9df2"),
-    "flown": ("#8339a8", "#cb9df2"),  # what an autopilot flew on: its own estimate, too
+    "flown": ("#8339a8", "#cb9df2"),  # the estimate used by an autopilot: its own, too
     "imu": ("#7a6000", "#d8bf5a"),
     "command": ("#57616c", "#a3adb8"),
     "gate": ("#b8232a", "#ff8078"),
@@ -108,7 +108,7 @@ def axis(title: str = "") -> dict[str, Any]:
 
 
 def layout(height_px: int) -> dict[str, Any]:
-    """What every figure shares: transparent ground, fonts, legend above, room for the axes."""
+    """The layout that every figure shares: transparent ground, fonts, legend above, room for the axes."""
     return {
         "height": height_px,
         "autosize": True,
@@ -160,7 +160,7 @@ def _packed(value: Any) -> Any:
 
 
 def figure(chart: Chart) -> Drawing:
-    """What is drawn of a chart."""
+    """The Plotly drawing of a chart."""
     data: list[dict[str, Any]] = []
     named: set[str] = set()
     for row, one_axis in enumerate(chart.axes, 1):

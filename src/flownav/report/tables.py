@@ -104,7 +104,7 @@ TOLD_LISTED = 200
 
 
 def autopilot_rows(record: Record, phases: Sequence[Phase] = ()) -> list[Event]:
-    """What an autopilot's log tells besides its sensors, in order of time: modes, messages, parameters set in it."""
+    """Events of an autopilot's log besides its sensors, in order of time: modes, messages, parameters set in it."""
     where = list(phases)
     return [
         Event(t_s, (source, kind, detail, value), phase_at(where, t_s))
@@ -134,7 +134,7 @@ def text(value: Any) -> str:
 
 
 def command(record: Record) -> str:
-    """The command line that made the record, "" where it does not say."""
+    """The command line that made the record, "" where it does not hold it."""
     stated = record.manifest.get("command")
     if isinstance(stated, (list, tuple)):
         return shlex.join(str(part) for part in stated)
@@ -168,7 +168,8 @@ def phases_within(phases: Sequence[Phase], t0: float, t1: float) -> str:
 
 
 def rejected_rows(record: Record, phases: Sequence[Phase] = ()) -> list[tuple[str, str, str, str, str]]:
-    """What was not fused, as (sensor, reason, readings and of how many, components, phase of most), most first.
+    """The readings that were not fused, as (sensor, reason, readings and of how many, components, phase of most), most
+    first.
 
     Records from before readings were counted have components only.
     """

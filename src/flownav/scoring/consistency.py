@@ -2,7 +2,7 @@
 
 Of one flight by its innovations (`consistency_of`): are they as large as it states, and is each one news. Of many
 flights by their errors from a known truth. Those are over steps in flight, those without skid contact, from the
-filter's start on: at rest on the ground a filter is told that it does not move, a pseudo-measurement whose stated sigma
+filter's start on: at rest on the ground a filter is given zero velocity, a pseudo-measurement whose stated sigma
 is a guess, and its errors there are none of a flying vehicle's.
 
 Sums, not flights, are kept: memory does not grow with the number of flights.
@@ -146,7 +146,7 @@ def consistency_by_sensor(
 
 
 def aloft(t_s: Array, said_s: Array, landed: Array) -> NDArray[np.bool_]:
-    """Which instants (n,) are in flight by a signal (m,) that is 1 on the ground; all where it tells of no flight."""
+    """Which instants (n,) are in flight by a signal (m,) that is 1 on the ground; all where it shows no flight."""
     if not len(said_s) or not (landed < 0.5).any():
         return np.ones(len(t_s), bool)
     row = np.clip(np.searchsorted(said_s, t_s, side="right") - 1, 0, len(said_s) - 1)
@@ -154,7 +154,7 @@ def aloft(t_s: Array, said_s: Array, landed: Array) -> NDArray[np.bool_]:
 
 
 def is_white(normalised: Array) -> bool:
-    """Whether normalised innovations (n,) tell no more of the next than chance would, or too little to matter."""
+    """Whether normalised innovations (n,) are uncorrelated, up to chance or an amount too small to matter."""
     band = SURE_99 / np.sqrt(max(len(normalised), 1))
     return bool(abs(lag_one(normalised)) <= max(band, LITTLE_COLOUR))
 
@@ -243,7 +243,7 @@ def efficiency(errors: ErrorSums, bound: ErrorSums) -> dict[str, float]:
 def over_stated(sums: ConsistencySums) -> dict[str, float]:
     """Root mean square of each state's error over what is stated of it: 1 is as stated, below 1 the error is smaller.
 
-    The NEES weighs all states at once; this tells which of them it is.
+    The NEES weighs all states at once; this separates them.
     """
     return dict(zip(STATES, map(float, sums.over_stated.root_mean_square()), strict=True))
 

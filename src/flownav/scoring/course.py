@@ -14,9 +14,9 @@ ROLLED_OVER_DEG = 30.0  # beyond what any of our skids stands on
 
 
 class Moving(NamedTuple):
-    """What one epoch shows of a flight: its motion (`touchdown.Motion`), and how wrong was what was flown on.
+    """One epoch of a flight: its motion (`touchdown.Motion`), and the error of the estimate used by the autopilot.
 
-    seen: the pad's place was to be seen or noted. away: it goes around.
+    seen: the pad could be seen or its place was noted. away: it goes around.
     """
 
     place_n: float
@@ -34,7 +34,7 @@ class Moving(NamedTuple):
 
 
 class Course(NamedTuple):
-    """What must be remembered of the epochs so far."""
+    """The memory of the epochs so far."""
 
     contact: float  # its epoch, of the first since the last go-around; -1: none
     untouched: float  # epochs without contact
@@ -45,7 +45,7 @@ class Course(NamedTuple):
     yaw_deg_s: float
     place_n: float
     place_e: float
-    seen_n: float  # error of what was flown on when the pad was last seen
+    seen_n: float  # error of the estimate in use when the pad was last seen
     seen_e: float
     over_grounded: float  # 1: rolled over on the ground
     over_since: float  # 1: rolled over since the contact
@@ -55,7 +55,7 @@ class Course(NamedTuple):
 
 
 class Touch(NamedTuple):
-    """The first contact: place, errors of what was flown on then and when the pad was last seen, motion before it."""
+    """The first contact: place, errors of the estimate in use then and when the pad was last seen, motion before it."""
 
     place_n: float
     place_e: float
@@ -83,13 +83,13 @@ def no_touch() -> Touch:
 
 @equation
 def lands(touches: bool, untouched: float) -> bool:
-    """Whether a contact after so many epochs without one is one after being airborne."""
+    """Whether a contact after `untouched` epochs without one is one after being airborne."""
     return touches and untouched >= AIRBORNE_EPOCHS
 
 
 @equation
 def followed(c: Course, touch: Touch, epoch: int, s: Moving) -> tuple[Course, Touch]:
-    """What is remembered with one epoch more."""
+    """The memory with one epoch more."""
     seen_n, seen_e = (s.flown_n, s.flown_e) if epoch == 0 else (c.seen_n, c.seen_e)
     met = c.contact < 0.0 and not s.away and lands(s.touches, c.untouched)
     contact = -1.0 if s.away else (float(epoch) if met else c.contact)
@@ -112,7 +112,7 @@ def followed(c: Course, touch: Touch, epoch: int, s: Moving) -> tuple[Course, To
 
 @kernel
 def put_first_contact(on_ground: Array, found: NDArray[np.int64]) -> None:
-    """What `first_contact` gives, into -1 in each lane."""
+    """Write the result of `first_contact` for each lane; -1 where there is none."""
     epochs, lanes = on_ground.shape
     for lane in range(lanes):
         untouched = 0.0

@@ -1,4 +1,4 @@
-"""From when to when each sensor spoke, and which was silent while the others spoke."""
+"""The time span of each sensor's readings, and the sensors that were silent while the others sent readings."""
 
 from collections.abc import Mapping
 
@@ -11,7 +11,7 @@ LEAST_SILENT_SHARE = 0.05  # of the log
 MOST_SILENT_SHARE = 0.25  # of a short log
 LONG_STEPS = 10.0  # a sensor's own steps that are no pause yet
 LEAST_STREAMS = 3  # that can outvote one
-SELDOM = (Sensor.LANDED, Sensor.PAD)  # these speak when there is something to say
+SELDOM = (Sensor.LANDED, Sensor.PAD)  # these send readings only at events
 
 Window = tuple[float, float]
 
@@ -49,7 +49,7 @@ def silences(streams: Mapping[Sensor, Stream], span_s: Window) -> list[str]:
 
 
 def _main_part(times: list[Array], span_s: Window) -> Window:
-    """From when to when half of the streams speak: the log's span, unless a few go far beyond the others."""
+    """The span in which half of the streams have readings: the log's span, unless a few go far beyond the others."""
     if len(times) < LEAST_STREAMS:
         return span_s
     starts, ends = sorted(t[0] for t in times), sorted(t[-1] for t in times)

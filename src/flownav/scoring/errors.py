@@ -71,7 +71,7 @@ def _sums_of(kept: Array) -> ErrorSums:
 
 @kernel
 def put_error_statistics(estimate: Array, truth: Array, counted: Array, result: Array) -> None:
-    """What `error_statistics` gives."""
+    """Write the result of `error_statistics`."""
     epochs, states, lanes = estimate.shape
     sums, count = np.zeros((states, lanes, 5)), np.zeros(lanes)
     for k in range(epochs):
@@ -170,7 +170,7 @@ def euler_deg(w: Array, x: Array, y: Array, z: Array) -> Array:
 
 def attitude_scores(blocks: Array) -> dict[str, Any] | None:
     """Errors of attitude [deg] as the JSON of `flownav fly`, blocks (flights, 3, 4): of one flight each number, of many
-    its median and 5th and 95th percentile; None where no attitude was said.
+    its median and 5th and 95th percentile; None where no attitude was estimated.
     """
     if not np.isfinite(blocks).any():
         return None
@@ -185,7 +185,7 @@ def attitude_scores(blocks: Array) -> dict[str, Any] | None:
 
 
 def attitude_rms(blocks: Array | None) -> dict[str, float | None]:
-    """RMS error of roll, pitch and yaw [deg] over all flights, blocks (flights, 3, 4); null where none was said."""
+    """RMS error of roll, pitch and yaw [deg] over all flights, blocks (flights, 3, 4); null without an estimate."""
     if blocks is None or not np.isfinite(blocks).any():
         return dict.fromkeys(ANGLES)
     squares = np.nanmean(blocks[:, :, STATISTICS.index("rms_error")] ** 2, axis=0)

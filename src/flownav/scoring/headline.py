@@ -8,7 +8,7 @@ from flownav.scoring.landings import NEVER_LANDED, WENT_AROUND
 
 
 def length(metres: float) -> str:
-    """A distance [m] in the unit that people say it in.
+    """A distance [m] as text, in cm or m.
 
     Example:
         >>> length(0.0231), length(0.46), length(3.479)
@@ -20,7 +20,7 @@ def length(metres: float) -> str:
 
 
 def sentence(manifest: Mapping[str, Any], scores: Mapping[str, Any]) -> str:
-    """How one simulated flight, or many, ended; "" where the scores say nothing of it.
+    """How one simulated flight, or many, ended; "" where the scores do not hold it.
 
     manifest: of a record; scores: of the flight, or of many flights beside it, as `flownav fly --json` has them.
     """

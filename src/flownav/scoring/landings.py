@@ -1,4 +1,4 @@
-"""Touchdowns and take-offs as `flownav fly`, `flownav accuracy` and the report say them: of one flight, and of many.
+"""Touchdowns and take-offs as `flownav fly`, `flownav accuracy` and the report print them: of one flight, and of many.
 
 Of many flights R95 is the radius about the pad's centre that 95 % of all flights that were to land do not exceed; one
 that crashed, never touched or never came to rest is infinitely far off. What limits the touchdown is the 95th
@@ -70,7 +70,7 @@ def touchdown_of_flight(row: Array) -> dict[str, Any] | None:
 def with_reason(scores: dict[str, Any], height_m: float, facts: Mapping[str, Any]) -> dict[str, Any]:
     """A flight's scores in which a landing that never came has its reason.
 
-    height_m: of the skids over the ground at the end; facts: what the flight's judging says of its gates.
+    height_m: of the skids over the ground at the end; facts: the gates in the flight's judging facts.
     """
     landing = scores["touchdown"]
     if landing is None or landing["verdict"] not in (NEVER_LANDED, WENT_AROUND):
@@ -105,7 +105,7 @@ def touchdown_of_flights(rows: Array) -> dict[str, Any] | None:
 
 
 def touches_of_flights(rows: Array, touchdown: Mapping[str, Any]) -> dict[str, Any]:
-    """Where many flights touched [m] from the pad's centre, those that did, and what `touchdown` says of their radius.
+    """Where many flights touched [m] from the pad's centre, those that did, and their radius from `touchdown`.
 
     rows (flights, len(TOUCHDOWN_COLUMNS)).
     """
@@ -115,7 +115,7 @@ def touches_of_flights(rows: Array, touchdown: Mapping[str, Any]) -> dict[str, A
 
 
 def verdict_of(row: Array) -> str:
-    """What became of a flight: landed, crashed, went around (and is aloft at the end), or none of these."""
+    """The outcome of a flight: landed, crashed, went around (and is aloft at the end), or none of these."""
     if row[BROKEN] > 0.0:
         return "crashed"
     if succeeded(row[None, :])[0]:
@@ -165,8 +165,8 @@ UP_SHARE = 0.5  # of the largest commanded height: above it a vehicle is up, and
 def takeoffs(height_m: Array, commanded_m: Array, sees_flow: Array, period_s: float) -> Array:
     """One row a flight, (lanes, len(TAKEOFF_COLUMNS)), of histories (epochs, lanes); heights are of the skids.
 
-    over_commanded_m: the largest height less the largest commanded one; without_flow_s: how long the flow sensor said
-    nothing (sees_flow 0) while the vehicle was above UP_SHARE of the largest commanded height.
+    over_commanded_m: the largest height less the largest commanded one; without_flow_s: how long the flow sensor gave
+    no flow (sees_flow 0) while the vehicle was above UP_SHARE of the largest commanded height.
     """
     top_m = commanded_m.max(axis=0)
     blind = (height_m > UP_SHARE * top_m) & (sees_flow <= 0.0)

@@ -38,10 +38,10 @@ class Path(NamedTuple):
 
 
 class References(NamedTuple):
-    """What a log knows. fixes and speeds: GPS position and velocity as they arrived, t_s (m,) and value (m, 3).
+    """The references in a log. fixes and speeds: GPS position and velocity as they arrived, t_s (m,) and value (m, 3).
 
     gps_delay_s: how old they were then. outages_s: windows in which GPS was withheld. truth: in its own frame; heading:
-    its heading where that came apart from it. flight_s: from when to when it flew, None where nobody says.
+    its heading where that came apart from it. flight_s: from when to when it flew, None where the log does not show it.
     """
 
     fixes: tuple[Array, Array] | None = None
@@ -189,8 +189,8 @@ def autopilot_errors(estimate: Table, truth: Table | None, gps: Mapping[Sensor, 
 
 
 def placed_in(t_s: Array, position: Array, estimate: Table, gps: Mapping[Sensor, Stream]) -> Alignment | None:
-    """What puts an autopilot's estimate into the frame of another one, t_s (n,) and position (n, 3); None where they
-    share no time.
+    """The alignment of an autopilot's estimate with the frame of another one, t_s (n,) and position (n, 3); None where
+    they share no time.
 
     By GPS where there is some: shifted by its mean difference from GPS, the frame of which is the other's. Without,
     the autopilot's north may be any: turned and shifted onto the other.

@@ -1,9 +1,9 @@
-"""What many flights' figures are: percentiles with their intervals, medians with their spread, differences.
+"""Figures of many flights: percentiles with their intervals, medians with their spread, differences.
 
 Errors of a filter are alike from one instant to the next, so that the instants of a flight are no independent samples.
 The stretch is cut into BATCHES of equal length and the mean difference of each is taken as one sample (the method of
 batch means; Law, Simulation Modeling and Analysis, 5th edition, section 9.5.3): the interval is Student's t of these.
-It says what this flight would show again under the same conditions, not what other flights would.
+It holds for this flight flown again under the same conditions, not for other flights.
 """
 
 from typing import NamedTuple

@@ -2,7 +2,7 @@
 
 They follow from the path and from ground contact alone, so that a simulated flight, a replay and a live session are
 divided alike. The path is the truth's, or the estimate's where there is no truth. Contact is the truth's, or else the
-landed signal's, the events' or the rangefinder's; where nothing tells it, the flight has no phases on the ground.
+landed signal's, the events' or the rangefinder's; where none of these is known, the flight has no phases on the ground.
 
 In the air a stretch climbs or descends where its height changes faster than CLIMB_M_S over WINDOW_S, and is a transit
 where it moves faster than TRANSIT_M_S over the ground; else it hovers. A stretch shorter than SHORTEST_S joins the
@@ -86,7 +86,7 @@ def _settling(labels: NDArray[np.int64], height_m: Array) -> NDArray[np.int64]:
 
 
 def contact_of(record: Record, t_s: Array) -> NDArray[np.bool_] | None:
-    """Whether the vehicle stands on the ground at each instant (n,); None where nothing in the record tells."""
+    """Whether the vehicle stands on the ground at each instant (n,); None where the record does not show it."""
     if _has(record, "truth", ("on_ground",)):
         table = record.tables["truth"]
         return _held(np.asarray(table["t_s"], float), np.asarray(table["on_ground"], float) > 0.5, t_s)
@@ -97,7 +97,7 @@ def contact_of(record: Record, t_s: Array) -> NDArray[np.bool_] | None:
 
 
 def _held(times: Array, said: NDArray[np.bool_], t_s: Array) -> NDArray[np.bool_]:
-    """The last that was said at each instant, breaks in contact shorter than a flutter bridged."""
+    """The last landed state reported at each instant, with breaks in contact shorter than a flutter bridged."""
     rows = np.clip(np.searchsorted(times, t_s, side="right") - 1, 0, len(times) - 1)
     held = said[rows]
     width = round(LONGEST_CONTACT_GAP_S / GRID_S)

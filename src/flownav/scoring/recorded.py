@@ -34,7 +34,7 @@ Estimate = Mapping[str, Column]
 
 
 def scored_table(record: Record) -> str:
-    """The table that is scored: what was flown on, where that differs from what the filter said."""
+    """The table that is scored: the estimate used by the autopilot, where that differs from the filter's."""
     return "flown" if "flown" in record.tables and record.manifest.get("kind") == "fly" else "estimate"
 
 
@@ -168,7 +168,7 @@ def estimate_scores(
 
 
 def references_in(record: Record) -> References:
-    """What the record of a replay knows that a path is scored against. InputError where it does not hold it."""
+    """The references for a path's scores in the record of a replay. InputError where it lacks them."""
     parameters, facts = record.manifest.get("parameters", {}), record.manifest.get("judging")
     if facts is None or "judging" not in record.tables:
         raise InputError("this record does not hold what its scores need; replay the log again with this flownav")
@@ -205,7 +205,7 @@ def consistency_in(record: Record) -> dict[str, dict[str, Any]]:
 
 
 def _aloft(record: Record, t_s: Array) -> NDArray[np.bool_]:
-    """Which instants (n,) are in flight: by the truth of a simulated one, else by what its landed signal says."""
+    """Which instants (n,) are in flight: by the truth of a simulated one, else by its landed signal."""
     for name, column in (("truth", "on_ground"), ("landed", "landed")):
         table = record.tables.get(name, {})
         if column in table:
@@ -216,8 +216,8 @@ def _aloft(record: Record, t_s: Array) -> NDArray[np.bool_]:
 class PhaseScores(NamedTuple):
     """A phase's errors, NaN where they are not known, and of the values offered to the filter how many were not fused.
 
-    horizontal_rms_m, vertical_rms_m: of what was flown on, or else of the estimate, against the truth, or else GPS.
-    velocity_rms_m_s: of the length of the velocity's error.
+    horizontal_rms_m, vertical_rms_m: of the estimate used by the autopilot, or else of the navigator's, against the
+    truth, or else GPS. velocity_rms_m_s: of the length of the velocity's error.
     """
 
     phase: Phase
@@ -261,8 +261,8 @@ def rejected_mostly_in(record: Record, phases: Sequence[Phase]) -> dict[tuple[st
 
 
 def errors_of(record: Record, columns: tuple[str, ...]) -> tuple[Array, Array] | None:
-    """Instants (n,) and errors (n, 3) against the truth, of what was flown on or else of the estimate; without a truth
-    those of the position against GPS.
+    """Instants (n,) and errors (n, 3) against the truth, of the estimate used by the autopilot or else of the
+    navigator's; without a truth those of the position against GPS.
     """
     truth = record.tables.get("truth", {})
     for name in ("flown", "estimate"):

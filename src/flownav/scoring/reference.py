@@ -19,7 +19,7 @@ LEAST_LIKENESS = 0.5
 
 
 class Alignment(NamedTuple):
-    """What takes the reference into the estimate's frame: first turned by yaw, then shifted.
+    """The transformation of the reference into the estimate's frame: first turned by yaw, then shifted.
 
     yaw_shown: whether the two paths move enough, and alike, to show the yaw; it is the best fit all the same.
     axis: the yaw's cosine and sine where they are known without it, which then are the same on every processor.
@@ -152,7 +152,7 @@ class Drift(NamedTuple):
 def drift_of(estimate: Motion, truth: Motion, flight_s: Window | None = None) -> Drift | None:
     """The error at the truth's instants of flight that both cover; None without such a flight.
 
-    flight_s: from when to when it flew; by the truth's height where nobody says.
+    flight_s: from when to when it flew; by the truth's height where it is not given.
 
     The truth is laid on the estimate at take-off, turned by the difference of headings there; without a heading of
     either by what fits the two paths best over the flight (least squares).
@@ -195,7 +195,7 @@ def _heading_at(path: Motion, at_s: float) -> float | None:
 def protection_of(
     t_s: Array, levels_m: Array, flagged: NDArray[np.bool_], drift: Drift | None
 ) -> dict[str, Any] | None:
-    """Levels of a flight, and the share of instants at which the horizontal error exceeds them unsaid.
+    """Levels of a flight, and the share of instants at which the horizontal error exceeds them without a warning.
 
     t_s (n,), levels_m (n, 2) horizontal and vertical, flagged (n,): whether a warning stands. The share is None
     without a truth; the whole is None where no level was computed.

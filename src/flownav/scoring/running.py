@@ -30,12 +30,12 @@ RUNNING_COLUMNS = len(SCORE_COLUMNS) + 1
 
 
 class Shown(NamedTuple):
-    """What one epoch shows of a flight, and how it counts.
+    """One epoch of a flight, and how it counts.
 
     pos and vel: the truth, NED [m] and body FRD [m/s]; q: its attitude, yaw_rate_rad_s; error: of the estimate,
-    position NED and body velocity; flown: horizontal error of what was flown on. counts: this step's errors are scored;
-    aloft: and it is in flight, after the pad was noted. seen: the pad's place was to be seen or noted. home: the errors
-    of this epoch are what horizontal errors are relative to.
+    position NED and body velocity; flown: horizontal error of the estimate used by the autopilot. counts: this step's
+    errors are scored; aloft: and it is in flight, after the pad was noted. seen: the pad could be seen or its place was
+    noted. home: horizontal errors are relative to the errors of this epoch.
     """
 
     pos_n: float
@@ -67,7 +67,7 @@ class Shown(NamedTuple):
 
 
 class Horizontal(NamedTuple):
-    """What must be remembered of the errors besides their sums: how many are scored, and the largest horizontal one."""
+    """The memory of the errors besides their sums: the number scored, and the largest horizontal one."""
 
     steps: float
     home_n: float
@@ -133,7 +133,7 @@ def moving_of(s: Shown, cg_above_skid_m: float) -> Moving:
 
 
 class Terms(NamedTuple):
-    """What a flight is judged by: its epochs, their length, when it is to land, and with the fields of
+    """The terms that a flight is judged by: its epochs, their length, when it is to land, and with the fields of
     `touchdown.Limits` what its touchdown may be.
     """
 

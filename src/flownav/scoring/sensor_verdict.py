@@ -1,4 +1,4 @@
-"""What the consistency of a sensor's innovations means to those who fly with it: harmless, or something to act on."""
+"""The meaning of a sensor's innovation consistency for its user: harmless, or something to act on."""
 
 from collections.abc import Iterable
 
@@ -13,11 +13,11 @@ MEANING = {
     "--settings, and errors that last are averaged less than it seems.",
     ACT: "the sensor is trusted too much, or does not fit the others: `flownav explain` looks for the cause; without "
     "one state a larger noise in --settings.",
-}  # what each of these says of an estimate's use, and what to do about it
+}  # the meaning of each verdict for the estimate's use, and the action to take
 
 
 def verdict(nis_per_dof: float, *, white: bool, refused: float = 0.0) -> str:
-    """A sensor in words: whether something must be done, and how large its errors are beside what the filter expects.
+    """A sensor in words: whether something must be done, and the ratio of its errors to the filter's expectation.
 
     refused: the share of its values, in flight, that lay outside the gate.
     """
@@ -32,6 +32,6 @@ def verdict(nis_per_dof: float, *, white: bool, refused: float = 0.0) -> str:
 
 
 def meanings(verdicts: Iterable[str]) -> list[str]:
-    """What the verdicts at hand mean for use and what to do, a sentence for each that occurs."""
+    """The meaning of each verdict and the action to take, a sentence for each that occurs."""
     found = list(verdicts)
     return [f"{word}: {meaning}" for word, meaning in MEANING.items() if any(said.startswith(word) for said in found)]

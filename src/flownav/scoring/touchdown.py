@@ -1,9 +1,10 @@
-"""The touchdown of a block of flights: at contact and at rest, what was limited by what, and whether it is a crash.
+"""The touchdown of a block of flights: at contact and at rest, the part of each cause, and whether it is a crash.
 
 Arrays are (epochs, lanes), places (epochs, 2, lanes) north and east of the pad's centre. A touchdown is judged where
 the middle of the skids is: the centre of gravity of a vehicle that hovers tilted moves when the skids come flat.
 
-Where it first touches is what guidance, estimate and pad add up to, as vectors. With e the error of what was flown on,
+The place of first contact is the sum of guidance, estimate and pad, as vectors. With e the error of the estimate used
+by the autopilot,
 
     place = (place + e) - (e - e_pad) - e_pad = guidance - estimate - pad,
 
@@ -62,7 +63,7 @@ NO_CONTACT, NO_REST, NO_PARTS = (np.nan,) * len(CONTACT), (np.nan,) * len(REST),
 
 
 class Limits(NamedTuple):
-    """What a vehicle's touchdown may be, as its file has it; beyond any of these it is a crash."""
+    """The limits of a vehicle's touchdown, from its file; beyond any of these it is a crash."""
 
     max_sink_rate_m_s: float
     max_lateral_speed_m_s: float
@@ -184,10 +185,10 @@ def touchdowns(
     t_s: Array, motion: Motion, flown_error: Array, pad_seen: Array, away: Array, limits: Limits,
     may_land_after_s: float,
 ) -> Array:  # fmt: skip
-    """Rows of TOUCHDOWN_COLUMNS, (lanes, len(TOUCHDOWN_COLUMNS)); what did not happen is NaN.
+    """Rows of TOUCHDOWN_COLUMNS, (lanes, len(TOUCHDOWN_COLUMNS)); events that did not happen are NaN.
 
-    flown_error (epochs, 2, lanes): position that was flown on less the truth; pad_seen (epochs, lanes) 0/1: the pad's
-    place was to be seen or noted; away (epochs, lanes) 0/1: the vehicle goes around.
+    flown_error (epochs, 2, lanes): position used by the autopilot less the truth; pad_seen (epochs, lanes) 0/1: the pad
+    could be seen or its place was noted; away (epochs, lanes) 0/1: the vehicle goes around.
     """
     block = Motion(*map(_plain, motion))
     told = Limits(*map(float, limits))
@@ -210,5 +211,5 @@ def _plain(values: Array) -> Array:
 
 
 def names_of(bits: float) -> list[str]:
-    """What a row's column "broken" says, in words."""
+    """The failures in a row's column "broken", in words."""
     return [name for bit, name in enumerate(BROKEN) if int(bits) >> bit & 1]

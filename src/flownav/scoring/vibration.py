@@ -6,7 +6,7 @@ import numpy as np
 
 from flownav.core.measurement import Array
 
-SEGMENT = 512  # readings of a periodogram: lines are told apart that lie two bins of rate / SEGMENT from each other
+SEGMENT = 512  # readings of a periodogram: lines are resolved that lie two bins of rate / SEGMENT from each other
 EVEN = 0.02  # so near the mean interval is the median one of readings without gaps
 LEAST_HZ = 20.0  # slower inertial readings show no vibration
 

@@ -1,4 +1,4 @@
-"""Inspection: a log in figures: its streams, clock, limits, what its sensors say of each other, what it lacks."""
+"""Inspection: a log in figures: its streams, clock, limits, agreement of its sensors, missing data."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -33,7 +33,7 @@ LIMITED = {"range_m": Sensor.RANGE, "flow_rad_s": Sensor.FLOW_RATE}
 
 
 def summarise(log: Log) -> dict[str, Any]:
-    """What `flownav info --json` prints; None where a figure does not exist. Nothing here raises for a poor log."""
+    """The output of `flownav info --json`; None where a figure does not exist. Nothing here raises for a poor log."""
     start, end = log.span_s
     look, why_not = _look(log)
     checked, found = _findings(log)
@@ -137,7 +137,7 @@ def _limit(log: Log, name: str) -> dict[str, Any]:
 
 
 def _findings(log: Log) -> tuple[str, list[Finding]]:
-    """What was compared with what, and what came of it."""
+    """The sensors that were compared with each other, and the findings."""
     if Sensor.ATTITUDE not in log.streams:
         return "no two sensors: the log has no attitude to compare the others with", []
     found = []
@@ -183,7 +183,7 @@ LEAST_JUMPING = 0.01  # of the steps in flight: of less, one echo is no trouble
 
 
 def told_of(log: Log, look: Look | None, found: Sequence[Finding]) -> list[Finding]:
-    """Warnings beside those found: the flow's axes, unless they are told already, and a range that jumps."""
+    """Warnings next to those found: the flow's axes, unless they are reported already, and a range that jumps."""
     told = []
     if look is not None and look.clear and not look.right and not any(finding.flow_is_wrong for finding in found):
         sure = look.correlation >= IN_PART

@@ -1,9 +1,10 @@
 """Flights of a certificate flown again: a random sample, and all that decided at the margin, the same to the bit.
 
-Digests tell of rows that were edited, not of an editor who makes digests anew. A flight is a function of the plan and
-of its number, so that any of them can be asked what it was. Of n flights of which k were altered a sample of m misses
-all with probability (1 - k/n)(1 - k/(n - 1)) ..., about exp(-m k / n): it finds who lifts a verdict that many flights
-are against. Who altered one flight of thousands is found where it stands at the margin, and by flying all.
+Digests reveal rows that were edited, not an editor who makes the digests anew. A flight is a function of the plan
+and of its number, so that any of them can be repeated. Of n flights of which k were altered a sample of m misses all
+with probability (1 - k/n)(1 - k/(n - 1)) ..., about exp(-m k / n): it finds an editor who turns a verdict against
+the evidence of many flights. The alteration of one flight of thousands is found if that flight is at the margin, or
+by flying all.
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ def deciding(requirement: Requirement, judgements: Sequence[Judgement], rows: Ar
 
 
 def drawn(flights: int, sample: int) -> NDArray[np.int64]:
-    """The places of so many flights, which nobody can know before; all where there are no more."""
+    """The numbers of `sample` of `flights` flights, drawn at random, sorted; all where there are no more."""
     return np.array(sorted(SystemRandom().sample(range(flights), min(sample, flights))), np.int64)
 
 

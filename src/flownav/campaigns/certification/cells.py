@@ -24,7 +24,7 @@ from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S
 from flownav.simulation.truth import SensorFault
 
-BEFORE_LANDING_S = 5.0  # that a fault begins, where the requirement does not say when
+BEFORE_LANDING_S = 5.0  # that a fault begins, where the requirement gives no time
 MOST_CELLS = 200
 
 
@@ -38,7 +38,7 @@ class SensorFailure:
 
     @property
     def words(self) -> str:
-        """What, from when to when, and what that does."""
+        """The failure, from when to when, and its effect, in words."""
         return f"{self.name} from {self.begins_s:.15g} to {self.ends_s:.15g} s: {FAULTS[self.name].what}"
 
     def law(self, flight: Flight, seed: int, number: int) -> SensorFault:
@@ -124,7 +124,7 @@ def _cell(requirement: Requirement, values: dict[str, Any], vehicle: str | None)
     failure = _failure(requirement, scenario, values.get("fault", NO_FAULT))
     cell = Cell(scenario, values, "ensemble", fixed=tuple(fixed_by(requirement)), failure=failure)
     names = tuple(requirement.conditions.ranges)
-    for share in (EDGE_MARGIN, 1.0 - EDGE_MARGIN):  # what cannot be is said now
+    for share in (EDGE_MARGIN, 1.0 - EDGE_MARGIN):  # check now what cannot be flown
         cell.setup.ensemble(Ends(names, share)).truths(requirement.seed, 0, 1)
     return cell
 

@@ -36,7 +36,7 @@ class Flown:
     """All flights of a certificate, one after the other: cell and number of each, (flights,).
 
     rows (flights, len(ROW_COLUMNS)); inputs: the dispersed numbers by name, (flights,), NaN in cells without one;
-    verdicts and limits: what became of each, and what limited it.
+    verdicts and limits: the outcome of each, and its limiting cause.
     """
 
     cell: NDArray[np.int64]
@@ -49,7 +49,7 @@ class Flown:
 
 @dataclass(frozen=True)
 class Certificate:
-    """What the flights show. ranking: None where none was asked for."""
+    """The judgement of a certificate's flights. ranking: None where none was asked for."""
 
     requirement: Requirement
     plan: Plan
@@ -97,9 +97,10 @@ class Certificate:
         return facts | ({"ranking": None, "split": None} if self.ranking is None else self.ranking)
 
     def chosen(self) -> dict[str, int | str | None]:
-        """What was left to whoever asked, and was not left as it is: the seed, how many flights in all, the vehicle.
+        """The user's choices that differ from the defaults: the seed, the number of flights in all, the vehicle; None
+        each where it is the default.
 
-        Who may choose these may try them until the flights pass.
+        A user who may choose these may try them until the flights pass.
         """
         own, cells = self.requirement, len(self.plan.cells)
         usual = cells * -(-own.flights() // cells)
@@ -142,7 +143,7 @@ def certify(
 
 
 def judged_from(requirement: Requirement, plan: Plan, data: Dataset) -> Certificate:
-    """What the flights of a folder show; all of the plan are there."""
+    """The certificate of a folder's flights; all flights of the plan are there."""
     flown = flown_of(plan, data)
     judgements = tuple(judged(table, flown.rows) for table in requirement.requirement)
     ready = plan.ready(0)
@@ -159,9 +160,9 @@ def checked(
     certificate: Certificate, data: Dataset, engine: Engine, sample: int = SAMPLE,
     on_progress: Callable[[int], object] = lambda flown: None,
 ) -> Certificate:  # fmt: skip
-    """The certificate once so many of its flights, drawn at random, and those that decided were flown again.
+    """The certificate once `sample` of its flights, drawn at random, and those that decided were flown again.
 
-    InputError where one is another than the folder has.
+    InputError where one differs from the folder's.
     """
     flown, plan = certificate.flown, certificate.plan
     margin = deciding(certificate.requirement, certificate.judgements, flown.rows)

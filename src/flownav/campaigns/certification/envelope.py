@@ -25,7 +25,7 @@ from flownav.core.measurement import Array
 from flownav.core.text import finite_or_none
 from flownav.simulation.ensemble import Ensemble
 
-PLAN_FAILURES = (0, 1, 2)  # failures of the plans that are told
+PLAN_FAILURES = (0, 1, 2)  # numbers of failures of the plans that are stated
 
 
 class Judgement(NamedTuple):
@@ -33,7 +33,7 @@ class Judgement(NamedTuple):
 
     most: failures with which these flights would still pass, -1: none. share: one-sided bounds of the share that
     succeeds. risk: how likely these flights pass when the requirement is only just not met. bound: the tolerance bound
-    of the measure, infinite where the flights give none, None of a measure that says yes or no. needs: flights by
+    of the measure, infinite where the flights give none, None of a measure that is yes or no. needs: flights by
     failures, for PLAN_FAILURES.
     """
 
@@ -73,7 +73,7 @@ class Judgement(NamedTuple):
         }
 
     def more(self) -> str:
-        """What more flights would be needed, in words; "" where the requirement is shown."""
+        """The further flights that are needed, in words; "" where the requirement is shown."""
         table, rate = self.table, self.failures / self.flights
         if self.verdict == "pass":
             return ""
@@ -125,7 +125,7 @@ def bad_first(table: RequirementTable, figures: Array) -> Array:
 # -- the envelope ------------------------------------------------------------------------------------------------
 WIND = (SPEED, DIRECTION)
 GRIDS = ((6, 12), (5, 8), (4, 8), (4, 4), (3, 4), (2, 4))  # fields of the first axis and the second, finest first
-USEFUL_FLIGHTS = 50  # flights of a field that say something, where there are too few to show the requirement
+USEFUL_FLIGHTS = 50  # flights of a field that are of use, where there are too few to show the requirement
 EDGE_SHARE = 1e-3  # share of a distribution that the outermost edge leaves out, where it has no end
 
 
@@ -179,7 +179,9 @@ def failing(requirement: Requirement, rows: Array) -> NDArray[np.bool_]:
 
 
 def _grid(requirement: Requirement, flights: int, axes: int) -> Sequence[int]:
-    """How many fields each axis has: the finest grid whose fields can show the requirement, else tell something."""
+    """How many fields each axis has: the finest grid whose fields can show the requirement, else the finest useful
+    one.
+    """
     needs = max(needed_by(table, 0) for table in requirement.requirement)
     fields = [int(np.prod(grid[:axes])) for grid in GRIDS]
     enough = [grid for grid, count in zip(GRIDS, fields, strict=True) if flights >= 1.25 * needs * count]

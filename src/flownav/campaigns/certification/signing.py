@@ -80,7 +80,7 @@ def _text_of(path: Path, argument: str) -> bytes:
 
 
 def _library() -> tuple[Any, Any]:
-    """What keys are read with. InputError without it."""
+    """The modules that read keys. InputError where the package is missing."""
     try:
         from cryptography.hazmat.primitives import serialization
         from cryptography.hazmat.primitives.asymmetric import ed25519

@@ -1,8 +1,8 @@
-"""A certificate's folder looked through: what of it holds, what does not, and what could not be looked at.
+"""Checks a certificate's folder: the parts that hold, that do not, and that could not be checked.
 
-Everything that certificate.json says is made anew: files by their hashes, rows by their digests, the plan and every
+Everything that certificate.json states is made anew: files by their hashes, rows by their digests, the plan and every
 figure from the requirement's file and the rows, the page from the figures, and a random sample of the flights by flying
-them, to the bit. What is not looked at is said.
+them, to the bit. Parts that are not checked are named.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ from flownav.report.campaign import render_certificate
 
 Found = Literal["holds", "does not hold", "not checked"]
 MOST_FACTS_BYTES = 256 << 20
-MADE_ANEW = ("worst", "flown_again")  # facts that hold more than what the rows alone say
+MADE_ANEW = ("worst", "flown_again")  # facts that need more than the rows
 RANKING_KEYS = ("ranking", "split")
-NEEDED = ("plan", "figures", "flights flown again")  # without these a folder can say whatever its maker likes
+NEEDED = ("plan", "figures", "flights flown again")  # without these a folder can hold anything
 NOT_LOOKED_AT = (
     ("flights of the ranking", "their outcomes are held by their hashes; they are not flown again"),
     ("records of the worst flights", "they are held by their hashes; `flownav report` reads them"),
@@ -44,7 +44,7 @@ NOT_LOOKED_AT = (
 
 
 class Check(NamedTuple):
-    """What was looked at, what was found, and a sentence on it."""
+    """A checked part, the finding, and a sentence on it."""
 
     what: str
     found: Found
@@ -80,7 +80,7 @@ class Verification:
 
     @property
     def wrong(self) -> list[str]:
-        """What does not hold; of what is not shown, why it could not be looked at."""
+        """The checks that do not hold; of a certificate that is not shown, those that could not be made and why."""
         if self.verification == "not shown":
             return [f"{check.what}: not checked: {check.said}" for check in self.checks
                     if check.found == "not checked" and set(check.what.split(", ")) & set(NEEDED)]  # fmt: skip
@@ -263,7 +263,7 @@ def _figures(made: Verification, asked: Requirement, plan: Plan) -> Certificate 
 
 
 def _differs(key: str, said: Any, own: Any) -> str:
-    """What differs, by its name and as deep as both are tables."""
+    """The first difference, by its dotted name, as deep as both are tables."""
     if isinstance(said, dict) and isinstance(own, dict):
         inner = next((name for name in own | said if own.get(name) != said.get(name)), "")
         return _differs(f"{key}.{inner}", said.get(inner), own.get(inner))
@@ -294,7 +294,7 @@ def _flights(
 
 
 class _NotFlown:
-    """What a ranking's outcomes would have to be flown with, where they are not there."""
+    """Stands for a ranking's engine where its outcomes are not in the folder; `fly` cannot be used."""
 
     piece = 1
 

@@ -31,14 +31,15 @@ from flownav.vehicle.kinds import vehicle_file
 from flownav.vehicle.parameters import MultirotorParameters
 
 PAGE, FACTS = "certificate.html", "certificate.json"
-SCHEMA = 1  # schemas/certificate.json says what stands in it
+SCHEMA = 1  # schemas/certificate.json defines its content
 
 
 def write_certificate(
     certificate: Certificate, store: Store, name: str, records: int,
     on_recorded: Callable[[int], object] = lambda done: None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Records and reports of so many of the worst flights, certificate.json and certificate.html; the facts of them.
+    """Write the records and reports of the `records` worst flights, certificate.json and certificate.html; returns the
+    facts.
 
     name: the requirement's, as it was given. OSError where a file cannot be written.
     """
@@ -55,7 +56,7 @@ def write_certificate(
 
 
 def drawn(certificate: Certificate) -> dict[str, Any]:
-    """What the page's figures show of each flight: figures of the measures, places of the touchdowns [m]."""
+    """Data of the page's figures for each flight: values of the measures, places of the touchdowns [m]."""
     rows, requirement = certificate.flown.rows, certificate.requirement
     measures = [table.measure for table in requirement.requirement]
     of = "rest" if "touchdown.rest_m" in measures else "contact"
@@ -108,8 +109,8 @@ def _made_by() -> dict[str, Any]:
     }
 
 
-# -- what it rests on --------------------------------------------------------------------------------------------
-# each is said at greater length in the docs named
+# -- limits of the certificate --------------------------------------------------------------------------------------
+# each is explained in the docs named
 NOT_MODELLED = (
     "Failures of servos, engine, battery, computer or software; sensors fail only where the conditions name a fault.",
     "Jamming and spoofing of GPS; multipath is a noise of stated size, not a place's own "
@@ -153,7 +154,7 @@ def assumed(plan: Plan) -> dict[str, Any]:
 
 
 def _variant(plan: Plan, number: int) -> dict[str, Any]:
-    """What is dispersed and what is told of the vehicle and the sensors of a cell."""
+    """The dispersions of a cell, and the data of its vehicle and sensors that the navigator is given."""
     cell, ensemble = plan.cells[number], plan.ready(number).ensemble
     assert ensemble is not None  # a certificate's cells are dispersed
     parameters = cell.setup.parameters
@@ -192,7 +193,7 @@ def words_of(entry: Distribution) -> str:
 
 
 def _uncertainty(cell: Cell, name: str) -> str:
-    """What the vehicle's file says of a number."""
+    """The uncertainty and source that the vehicle's file states for a number."""
     stated = {f"vehicle.{entry.key}": entry for entry in cell.setup.described.entries}.get(name)
     if stated is None:
         return ""
@@ -225,7 +226,9 @@ def _files_of(scenario: Scenario) -> Iterable[Path]:
 
 
 def hashes_again(said: Mapping[str, str], folder: Path | None) -> str | None:
-    """What is wrong with files that are to have these SHA-256; None where nothing is. folder: in which they lie."""
+    """The first file whose SHA-256 differs or that is missing, and why; None where all agree. folder: in which they
+    lie.
+    """
     for name, digest in said.items():
         path = Path(name) if folder is None else folder / name
         if folder is not None and (Path(name).is_absolute() or ".." in Path(name).parts):

@@ -1,8 +1,8 @@
 """The faults by name: what each is, what it strikes, how large it is, and what it does to a vehicle's own sensors.
 
-What a receiver sorts out before its navigator hears of it cannot be flown apart: readings stamped ahead of the clock
-are not fed, as if they were lost, and that is how they are flown; doubled and disordered readings, which its queue
-drops or puts in order again, are not flown at all (`flownav faults --offline` tries them).
+Readings that a receiver sorts out before its navigator cannot be flown as faults of their own: readings stamped
+ahead of the clock are not fed, as if they were lost, and that is how they are flown; doubled and disordered
+readings, which its queue drops or puts in order again, are not flown at all (`flownav faults --offline` tries them).
 """
 
 import math
@@ -179,7 +179,7 @@ def law_of(
 ) -> SensorFault:
     """A fault from begins_s to ends_s; course_rad: the direction in which it moves a position.
 
-    flow_period_s: between two readings of flow, of which so many are kept as `flow_late` needs at up to 70 Hz.
+    flow_period_s: between two readings of flow; as many readings are kept as `flow_late` needs at up to 70 Hz.
     KeyError where it cannot be flown (`NOT_FLOWN`).
     """
     does: dict[str, Any] = dict(DOES[fault.name])

@@ -1,8 +1,8 @@
-"""Faults in the closed loop: the autopilot flies on the faulty estimate, from take-off to rest.
+"""Faults in the closed loop: the autopilot uses the faulty estimate, from take-off to rest.
 
-Each fault is flown by a block of flights with truths and noise of their own, and by as many without it. What counts is
-what becomes of the vehicle: whether it landed, went around or crashed, and how far the estimate was off while nothing
-had been said of it.
+Each fault is flown by a block of flights with truths and noise of their own, and by as many without it. The vehicle's
+outcome counts: whether it landed, went around or crashed, and how large the error of the estimate was before any
+warning.
 """
 
 from collections import Counter
@@ -37,7 +37,7 @@ AROUND_S = 35.0  # time for a go-around
 WITHIN_S = 1.0
 CONTACT_S = column_of("contact", "t_s")
 VERDICTS = ("landed", "went around", "crashed", "unfinished")
-# what the navigator says when something is wrong; starts, datums and standing still are no warnings
+# the navigator's warnings; starts, datums and standing still are none
 WARNINGS = {
     ("flow", "doubted"), ("filter", "dead_reckoning"), ("filter", "position_invalid"), ("imu", "lost"),
     ("imu", "doubted"), ("imu", "spike"), ("range", "stuck"), ("range", "reset"), ("gps", "reset"),
@@ -54,8 +54,9 @@ AUTOPILOT = {
 
 
 class FlightScores(NamedTuple):
-    """One flight: when something was first noticed and said [s after the fault began], the largest horizontal error of
-    what was flown on, ever and before anything was said [m], what became of it, how far off the pad it rests [m].
+    """One flight: time of the first refusals and of the first warning [s after the fault began], the largest horizontal
+    error of the estimate used by the autopilot, ever and before any warning [m], the outcome, and the distance from the
+    pad at rest [m].
     """
 
     noticed_s: float | None
@@ -105,7 +106,7 @@ def flown_table(
 ) -> list[Row]:
     """Fly every fault at every height for every duration: rows by height, without a fault first.
 
-    matched: vehicle and sensors as their datasheets say; else each flight has a truth of its own.
+    matched: vehicle and sensors as in their datasheets; else each flight has a truth of its own.
     """
     rows = []
     for height_m in heights_m:
@@ -122,7 +123,9 @@ def flown_table(
 
 
 def scenario_flown(height_m: float, vehicle: str | None = None) -> Scenario:
-    """Up from the pad at 1 m/s, 15 s of hover, down at 0.3 m/s, with time for a go-around; flown on the estimate."""
+    """Up from the pad at 1 m/s, 15 s of hover, down at 0.3 m/s, with time for a go-around; the autopilot uses the
+    estimate.
+    """
     words = f"faults_{height_m:g}_m", "landing on the same pad, go-arounds"
     return hovering(words, height_m, window_start(height_m) + DESCENDS_AFTER_S, AUTOPILOT, vehicle, AROUND_S)
 
@@ -133,7 +136,7 @@ def _fly(
     """The scores of each flight."""
     ensemble = None if matched else setup.ensemble()
     flight = setup.flight._replace(fails=True)
-    assert setup.fitted is not None  # `BASE` flies on the navigator
+    assert setup.fitted is not None  # `BASE` uses the navigator
     assert flight.onboard is not None
     horizon_s, period_s = setup.fitted.schedule.horizon_s, flight.onboard.carried.flow_camera.clock.every * EPOCH_S
     for first in range(0, flights, len(LANES)):
@@ -158,10 +161,10 @@ def law_of_flight(
 def scores_of(
     flown: Flown, landing: Array, lane: int, sensors: tuple[Sensor, ...], t0_s: float, horizon_s: float
 ) -> FlightScores:
-    """What one lane's flight did from t0 on; landing: its row of touchdowns; horizon_s: of the navigator."""
+    """The scores of one lane's flight from t0 on; landing: its row of touchdowns; horizon_s: of the navigator."""
     t_s = np.arange(len(flown.history)) * EPOCH_S
     error_m = flown_error(flown.history, lane)
-    down_s = touched_s(flown.history, landing, lane, t0_s)  # what is said later is no help
+    down_s = touched_s(flown.history, landing, lane, t0_s)  # a later warning is no help
     said = first_warning(flown.tape.events(lane), t0_s, down_s, horizon_s)
     from_fault = (t_s >= t0_s) & np.isfinite(error_m)
     unsaid = from_fault & (t_s < (np.inf if said is None else said))
@@ -177,7 +180,9 @@ def scores_of(
 
 
 def flown_error(history: Array, lane: int) -> Array:
-    """Horizontal error of what was flown on, relative to where the pad is taken to be (epochs,) [m]; in flight."""
+    """Horizontal error of the estimate used by the autopilot, relative to the believed place of the pad (epochs,) [m];
+    in flight.
+    """
     said, true = (history[:, columns(table, POSITION_NED), lane][:, :2] for table in ("estimate", "truth"))
     airborne = history[:, column("truth", "contact_n"), lane] <= 0.0
     return np.where(airborne, np.hypot(*(said - true).T), np.nan)
@@ -192,7 +197,7 @@ def touched_s(history: Array, landing: Array, lane: int, t0_s: float) -> float:
 
 
 def first_warning(events: Array, t0_s: float, t1_s: float, horizon_s: float) -> float | None:
-    """When the navigator first says that something is wrong, in [t0, t1); rows of its tape, a horizon behind."""
+    """Time of the navigator's first warning in [t0, t1); rows of its tape, a horizon behind."""
     warnings = [t_s + horizon_s for t_s, kind, _ in events.tolist() if EVENT_NAMES[int(kind)][:2] in WARNINGS]
     return min((t_s for t_s in warnings if t0_s <= t_s < t1_s), default=None)
 
@@ -200,7 +205,9 @@ def first_warning(events: Array, t0_s: float, t1_s: float, horizon_s: float) -> 
 def first_refusals(
     offers: Array, sensors: tuple[Sensor, ...], window_s: tuple[float, float], horizon_s: float, said_s: float | None
 ) -> float | None:
-    """When more readings of the struck sensors than ever before in a second had been refused, or it was said."""
+    """Time at which more readings of the struck sensors than ever before had been refused within a second, or of a
+    warning.
+    """
     t0_s, t1_s = window_s
     offered = InnovationRow.of(offers)
     refused = np.isin(offered.sensor, [int(sensor) for sensor in sensors]) & (offered.reason != Reason.FUSED)

@@ -1,11 +1,11 @@
-"""What goes wrong with a sensor: streams with a fault in them, and in what order a navigator is fed of them.
+"""Sensor faults: streams with a fault in them, and the order in which a navigator is fed with them.
 
 A receiver holds what arrives until a horizon has passed the instant that it describes, and feeds in the order of those
-instants. What comes after its turn is fed at once, for the navigator to refuse; what is stamped ahead of the receiver's
-own clock has not been measured yet, and is not fed.
+instants. A reading that comes after its turn is fed at once, for the navigator to refuse; one that is stamped ahead of
+the receiver's own clock has not been measured yet, and is not fed.
 
-An injector takes a stream and a `Strike`, which says what readings it may touch. Readings outside stay as they are,
-value for value. Rows of a stream stand in the order of arrival, so after an injector that reorders rows or moves
+An injector takes a stream and a `Strike`, which names the readings that it may change. Readings outside stay as they
+are, value for value. Rows of a stream stand in the order of arrival, so after an injector that reorders rows or moves
 time stamps `t_s` no longer increases: that is the fault.
 """
 
@@ -119,7 +119,7 @@ def doubled(stream: Stream, strike: Strike) -> Stream:
 
 
 def reversed_in_blocks(readings: int) -> Injector:
-    """Every so many readings arrive last first, each with its own time stamp."""
+    """Each block of `readings` readings arrives last first, each with its own time stamp."""
 
     def inject(stream: Stream, strike: Strike) -> Stream:
         rows = np.flatnonzero(strike.inside)
@@ -143,7 +143,7 @@ def restamped(jump_s: float) -> Injector:
 
 
 def late(delay_s: float) -> Injector:
-    """A reading says what it would have said so much earlier; when it arrives and the delay it states stay."""
+    """Each reading has the content of `delay_s` earlier; its arrival time and the delay it states stay."""
 
     def inject(stream: Stream, strike: Strike) -> Stream:
         rows = np.arange(len(stream))
@@ -204,7 +204,7 @@ def garbage(largest: float) -> Injector:
 
 
 def low_texture(share: float, noise_rad_s: float, quality: float) -> Injector:
-    """What block matching finds where there is little to match: a share of the flow, noise, and some quality.
+    """The output of block matching over low texture: a share of the flow, noise, and some quality.
 
     noise_rad_s: of each reading; a velocity has it times the last range, or times a metre without one.
     """

@@ -1,4 +1,4 @@
-"""The navigator on trial, behind a horizon, told what the datasheets of the sensors state, and what it gives back."""
+"""Runs the navigator under test behind a horizon, set up from the sensors' datasheets, and collects its outputs."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ from flownav.simulation.assemble import Setup
 class Offers(NamedTuple):
     """One row for each component of a reading that the navigator was given and judged.
 
-    t_s (m,): the reading's time stamp, as in the stream that was handed in (not less its delay). sensor (m,): of
+    t_s (m,): the reading's time stamp, as in the stream that was given (not less its delay). sensor (m,): of
     measurement.Sensor. component (m,): its number in the reading. fused (m,): whether it moved the state or set a
     datum. reason (m,): the label where it was not.
     """
@@ -51,7 +51,7 @@ class Event(NamedTuple):
 
 @dataclass(frozen=True)
 class Navigated:
-    """What a navigator made of a log.
+    """The outputs of a navigator on a log.
 
     t_s (n,) increasing, the instants that the estimates describe; position_ned_m and sigma_ned_m (n, 3) in the log's
     local frame, one standard deviation each; offers, events, flags in any order. levels_m (n, 2): protection levels,
@@ -75,7 +75,7 @@ TAKEN_IN = (Reason.FUSED, Reason.DATUM)
 
 
 def navigator_told(told: Told) -> Navigate:
-    """The navigator that is told this; how old readings are, their streams state."""
+    """The navigator with these settings; streams state the delays of their readings."""
 
     def navigate(streams: Mapping[Sensor, Stream]) -> Navigated:
         """Raises InputError where the filter never starts."""
@@ -100,7 +100,7 @@ def started(streams: Mapping[Sensor, Stream], told: Told) -> tuple[Prepared, Eve
 
 
 def navigator_of(setup: Setup) -> Navigate:
-    """The navigator of a simulated vehicle, told what it is told in flight.
+    """The navigator of a simulated vehicle, with the same settings as in flight.
 
     ValueError where the vehicle carries no sensors of its own.
     """
@@ -121,9 +121,11 @@ def _flow_as_it_is(streams: Mapping[Sensor, Stream]) -> IdentifiedFlow | None:
     return None if flow is None else IdentifiedFlow(1.0, 1.0, flow.delay_s)
 
 
-# -- what came of it ---------------------------------------------------------------------------------------
+# -- outputs ---------------------------------------------------------------------------------------------------
 def navigated(written: Written, prepared: Prepared) -> Navigated:
-    """What was written as the judges of faults take it. A state that is no number has no standard deviation either."""
+    """The written outputs in the form that the judges of faults take. A state that is no number has no standard
+    deviation either.
+    """
     said = EstimateRow.of(written.estimate)
     return Navigated(
         said.t_s,

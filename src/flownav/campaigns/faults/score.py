@@ -1,4 +1,4 @@
-"""What a fault did to a navigator: when it was noticed, how far the estimate went, when it was back.
+"""The effect of a fault on a navigator: time to notice, largest error of the estimate, time to recover.
 
 Each figure is defined in docs/explanation/faults.md. A run with the fault is compared with one of the same
 flight without it.
@@ -23,7 +23,7 @@ STAYS_S = 1.0
 SAME_S = 0.05  # happenings of two runs that lie no further apart are the same
 BY_COLUMN = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.RANGE,
              Sensor.BARO, Sensor.POSE, Sensor.PAD)  # component k observes column k  # fmt: skip
-FILTER = "filter"  # the source of what the navigator says of itself
+FILTER = "filter"  # the source of the navigator's own reports
 
 
 class FaultScores(NamedTuple):
@@ -138,7 +138,7 @@ def wrongly_fused(run: Navigated, clean: Stream, faulty: Stream) -> int:
 
 
 def _said(stream: Stream, component: int) -> list[tuple[int, bytes]]:
-    """What every reading says of a component: its time stamp and the bytes, of all where the component is of all."""
+    """Time stamp and bytes of each reading's component; of the whole reading where a component belongs to all of it."""
     columns = slice(component, component + 1) if stream.sensor in BY_COLUMN else slice(None)
     content = np.column_stack([stream.value[:, columns], stream.variance[:, columns], stream.quality])
     return [(_stamp(t_s), row.tobytes()) for t_s, row in zip(stream.t_s, content, strict=True)]
@@ -193,7 +193,7 @@ def touchdown_error(course: Course, truth: Table) -> float | None:
 
 
 def unflagged(run: Navigated, course: Course, t0_s: float) -> float:
-    """The longest time from t0 on that the error is beyond 3 sigma before any event or flag says so."""
+    """The longest time from t0 on that the error is beyond 3 sigma before any event or flag."""
     said = np.array([event.t_s for event in run.events] + [flag.t0_s for flag in run.flags])
     longest = 0.0
     for first, last in _stretches(course.beyond & (course.t_s >= t0_s)):

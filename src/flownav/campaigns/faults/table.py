@@ -25,8 +25,8 @@ BASE = "pad_return"  # its vehicle, sensors, wind and pad
 TAKEOFF_S, CLIMB_M_S, SETTLING_S, AFTER_S = 5.0, 1.0, 10.0, 5.0
 SINK_M_S, RESTING_S = 0.3, 5.0
 NO_FAULT = "none"
-# When a vehicle on the pad is told where it stands, and how well: its navigator has levelled by then and has started.
-# Ten times within a second: a single one that is two sigma off counts as no more.
+# Times at which a vehicle on the pad is given its position, and its accuracy: its navigator has levelled by then and
+# has started. Ten times within a second: a single one that is two sigma off counts as no more.
 PLACED_S, PLACED_SIGMA_M = np.arange(3.0, 4.0, 0.1), 0.02
 
 
@@ -104,7 +104,7 @@ def window_start(height_m: float) -> float:
 def flight_at(height_m: float, longest_s: float, seed: int, vehicle: str | None = None) -> Log:
     """The log of one flight that hovers at a height for as long as any fault takes, and then lands.
 
-    With ten POSEs: a vehicle on its pad is told where it stands, so that errors are not those of the GPS's frame.
+    With ten POSEs: a vehicle on its pad is given its position, so that errors are not those of the GPS's frame.
     """
     setup = assemble(scenario_at(height_m, longest_s, vehicle))
     return stood(log_of(fly_recorded(setup, seed), setup))
@@ -122,11 +122,11 @@ def stood(log: Log) -> Log:
 
 
 def scenario_at(height_m: float, longest_s: float, vehicle: str | None = None) -> Scenario:
-    """Up from the pad at 1 m/s, hover, down at 0.3 m/s, and 5 s on the pad; flown on the truth.
+    """Up from the pad at 1 m/s, hover, down at 0.3 m/s, and 5 s on the pad; the autopilot uses the truth.
 
     So that a fault in the streams changes nothing of the flight. InputError where the height cannot be flown.
     """
-    words = f"hover_{height_m:g}_m", "landing on the same pad, flown on the truth"
+    words = f"hover_{height_m:g}_m", "landing on the same pad, autopilot on the truth"
     land_s = window_start(height_m) + longest_s + AFTER_S
     return hovering(words, height_m, land_s, {"feedback": "truth"}, vehicle)
 
@@ -160,10 +160,10 @@ VALUE, VARIANCE = FED.index("value_0"), FED.index("variance_0")
 
 
 def log_of(record: Record, setup: Setup) -> Log:
-    """The log of a recorded flight of `setup`, with the flight's truth and what its autopilot flew on beside it.
+    """The log of a recorded flight of `setup`, with the flight's truth and the estimate that its autopilot used.
 
     Each stream states the age of its readings as the sensor's datasheet does. ValueError where the flight carries no
-    sensors of its own (it flew on the paper's filter).
+    sensors of its own (it used the paper's filter).
     """
     if "fed" not in record.tables or setup.fitted is None:
         raise ValueError("the flight has no sensors of its own; fly it on the navigator")

@@ -41,7 +41,8 @@ class Branch(NamedTuple):
 
 
 class Space:
-    """What is drawn for a flight of a setup: the dispersed inputs first, then what its sensors are and how they start.
+    """The random numbers of a setup's flights: the dispersed inputs first, then the sensors' constants and start
+    values.
 
     names: of the numbers drawn once. spans: of the flight, KEYED_EPOCHS each.
     """
@@ -84,7 +85,7 @@ class Space:
         return rows_of(self.flight, history)
 
     def block(self, values: dict[str, list[float]], start: Array, streams: Streams) -> Branches:
-        """What the engine flies: dispersed numbers, start normals (lanes, starts) and streams (lanes, spans)."""
+        """The engine's input: dispersed numbers, start normals (lanes, starts) and streams (lanes, spans)."""
         lanes = len(streams)
         truths = [believed(self.flight)] * lanes
         if self.ensemble is not None:

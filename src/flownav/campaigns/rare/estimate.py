@@ -27,7 +27,7 @@ DIRECT_FLIGHTS = 4096  # at once, where there are no levels to climb
 FAR = 3.7  # -ln((1 - CONFIDENCE) / 2): none of n flights shows that the probability is below FAR / n
 NEGLIGIBLE, SMALL = 0.02, 0.1  # of the event's other part: not worth flights, or not worth more of them
 LEAST_PROBABILITY = 1e-9  # no probability below that is sought
-PILOTS_FACTOR = 5.0  # a pilot's own estimate is seldom so many times too small
+PILOTS_FACTOR = 5.0  # a pilot's own estimate is seldom too small by more than this factor
 
 
 class Found(NamedTuple):
@@ -75,7 +75,7 @@ def find(walker: walk.Walker, limit: float, most: int, beside: float = 0.0) -> F
 
 
 def found_on(ladder: walk.Ladder, lots: list[walk.Islands], count: int) -> Found:
-    """What islands of `count` flights a level say together: the mean of their estimates."""
+    """The joint result of islands of `count` flights a level: the mean of their estimates."""
     estimates = np.concatenate([lot.estimates for lot in lots])
     islands, mean = len(estimates), float(estimates.mean())
     shares = np.concatenate([lot.shares for lot in lots]).mean(axis=0)
@@ -138,12 +138,12 @@ def together_with(parts: list[Found]) -> tuple[float, float, float, float]:
 
 # -- all parts ---------------------------------------------------------------------------------------------------
 FEWEST_FLIGHTS, MOST_FLIGHTS = 2000, 100_000
-USUAL_FLIGHTS = 512  # that say what a usual touchdown is
+USUAL_FLIGHTS = 512  # that define a usual touchdown
 
 
 @dataclass(frozen=True)
 class Rare:
-    """What was found. cv None: nothing happened, and the interval is all that is known.
+    """The result. cv None: the event never happened, and the interval is all that is known.
 
     parts: of the event, each with its probability and its levels. inputs, noise: as `likely` ranks them. branch: the
     most likely flight, of this response; None where the event never happened.
@@ -236,8 +236,8 @@ def most_likely(
 ) -> tuple[Branch, float]:
     """The flight to look at, and its response: of the event's likelier part.
 
-    It is the one whose telling inputs are the most probable together; where no input tells anything, the one that the
-    event befell least.
+    It is the one whose ranked inputs are the most probable together; where no input is ranked, the one least far in
+    the event.
     """
     part = int(np.argmax([one.probability for one in found]))
     beyond = found[part].beyond

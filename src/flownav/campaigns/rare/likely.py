@@ -1,8 +1,8 @@
 """The most likely way there, and how near a flight comes to an event, as a number that grows towards it.
 
-Of each number that was drawn: its mean in standard deviations of what it is in all flights, the standard deviation
-about that, and how many nats the two say of it: the Kullback-Leibler divergence of N(mean, spread^2) from N(0, 1). A
-pad can be missed to the north and to the south: then the mean stays where it was and the spread grows.
+Of each number that was drawn: its mean in standard deviations over all flights, the standard deviation about that,
+and the information of the two in nats: the Kullback-Leibler divergence of N(mean, spread^2) from N(0, 1). A pad can
+be missed to the north and to the south: then the mean stays where it was and the spread grows.
 """
 
 from collections.abc import Callable
@@ -79,7 +79,9 @@ def _missing(event: Event, rows: Array) -> NDArray[np.bool_]:
 
 
 def _finite(values: Array) -> Array:
-    """What is infinite is farthest from this part of the event: it is the other part's."""
+    """Values with -inf for those that are infinite: these are farthest from this part of the event and belong to the
+    other part.
+    """
     return np.where(np.isfinite(values), values, -np.inf)
 
 
@@ -92,8 +94,8 @@ def figures(rows: Array, limits: Limits) -> Array:
 def severity(rows: Array, limits: Limits, typical: Array, failed: NDArray[np.bool_]) -> Array:
     """How hard a touchdown was, (flights,): how far the hardest figure is on its way from what is typical to its limit.
 
-    Above 1 exactly where it `failed`, infinite where no limit on the touchdown says why. A figure that is large in
-    every flight, as the tilt in trim is, thereby says nothing until it grows. 0 where nothing was touched.
+    Above 1 exactly where it `failed`, infinite where no limit on the touchdown is the reason. A figure that is large in
+    every flight, as the tilt in trim is, thereby has no weight until it grows. 0 where nothing was touched.
     """
     begins = np.minimum(typical, NEAREST_SHARE)
     on_the_way = (figures(rows, limits) - begins) / (1.0 - begins)
@@ -122,12 +124,14 @@ def nats(mean: Array, spread: Array) -> Array:
 
 
 def effective(weights: Array) -> float:
-    """How many flights of one weight say as much."""
+    """The number of equally weighted flights of the same information."""
     return float(weights.sum() ** 2 / (weights**2).sum())
 
 
 def rank_inputs(names: list[str], inputs: Array, weights: Array, independent: float) -> list[dict[str, Any]]:
-    """The inputs that differ by more than chance, the most telling first. independent: flights that are so, about."""
+    """The inputs that differ by more than chance, the most informative first. independent: approximate number of
+    independent flights.
+    """
     mean, spread = moments(inputs, weights)
     said = nats(mean, spread)
     order = [k for k in np.argsort(-said) if said[k] > CHANCE_NATS / independent][:MOST_TOLD]
@@ -140,7 +144,7 @@ def rank_inputs(names: list[str], inputs: Array, weights: Array, independent: fl
 def rank_noise(flight: Flight, seed: int, states: States, weights: Array, independent: float) -> list[dict[str, Any]]:
     """The window of each source whose sum of noise differs most, where it does by more than chance.
 
-    Of many flights the noise of some is looked at, one in so many of them.
+    Of many flights the noise of only every n-th is read, NORMALS_READ normals at most.
 
     A window's sum is over the readings in WINDOW_S, in standard deviations of such a sum: slow noise shows, fast does
     not.

@@ -1,13 +1,13 @@
 """Subset simulation: a small probability as a product of larger ones, by walks among flights beyond a level.
 
-A flight is what was drawn for it: the numbers drawn once (dispersed inputs, what its sensors are and how they start),
-kept as they are, and the noise of every epoch, which nobody keeps: a flight holds the number of the stream that its
-noise comes from, one for each span of KEYED_EPOCHS epochs. A walk's step moves both a little and in such a way that,
-were there no level, all flights would stay as probable as they are (Neal, "Regression and classification using
-Gaussian process priors", 1998; Papaioannou et al., Probabilistic Engineering Mechanics 41, 2015): the numbers z become
-(1 - s) z + sqrt(1 - (1 - s)^2) xi, and each stream is, by the chance s, a new one. Noise of so many independent draws
-thereby keeps the correlation 1 - s with what it was, as z does, at the cost of one flight however long the walk. A step
-that ends at or below the level is not taken.
+A flight is its random draws: the numbers drawn once (dispersed inputs, the sensors' constants and start values), kept
+as they are, and the noise of every epoch, which is not kept: a flight holds the number of the stream that its noise
+comes from, one for each span of KEYED_EPOCHS epochs. A walk's step moves both a little and in such a way that, were
+there no level, all flights would stay as probable as they are (Neal, "Regression and classification using Gaussian
+process priors", 1998; Papaioannou et al., Probabilistic Engineering Mechanics 41, 2015): the numbers z become (1 - s) z
++ sqrt(1 - (1 - s)^2) xi, and each stream is, by the chance s, a new one. The noise as a whole, made of many independent
+draws, thereby keeps the correlation 1 - s with its former value, as z does, at the cost of one flight however long the
+walk. A step that ends at or below the level is not taken.
 
 After Au and Beck (Probabilistic Engineering Mechanics 16, 2001), in two parts. A pilot finds levels that about one in
 eight of the flights beyond the last one exceeds, and the size of the steps. Then, with both fixed, independent
@@ -96,13 +96,13 @@ def ancestors(rng: np.random.Generator, beyond: NDArray[np.int64], count: int) -
 
 
 # -- levels and islands ------------------------------------------------------------------------------------------
-WALK_STATES = 8  # states of a walk, its first among them: one in so many flights is beyond the next level
+WALK_STATES = 8  # states of a walk, its first among them: one in this number of flights is beyond the next level
 LARGEST_SHARE = 0.5  # of the flights beyond a level, where its ties allow
 STEP_SIZES = np.array([0.02, 0.05, 0.1, 0.2, 0.4, 0.8])  # of steps, that a pilot tries
 
 
 class Ladder(NamedTuple):
-    """What a pilot found: levels up to the event's, and the size of the steps beyond each but the last.
+    """The result of a pilot: levels up to the event's, and the size of the steps beyond each but the last.
 
     above: the pilot's own estimate for the last level, and reached whether that is the event's.
     """

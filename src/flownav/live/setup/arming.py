@@ -1,4 +1,4 @@
-"""What keeps a vehicle from arming that no parameter shows: its origin where it has no GPS, and what it says itself."""
+"""Blocks to arming that no parameter shows: the origin of a vehicle without GPS, and the autopilot's own report."""
 
 from typing import NamedTuple
 
@@ -7,10 +7,10 @@ from flownav.live.setup.talk import Talk
 from flownav.logs.mavlink.framing import ARDUPILOT, Message, Value
 
 Place = tuple[float, float, float]  # latitude, longitude [deg], altitude [m]
-# of which one that is 0 says that the vehicle has no receiver
+# a parameter of these that is 0 means that the vehicle has no receiver
 RECEIVERS = {"ardupilot": ("GPS1_TYPE", "GPS_TYPE"), "px4": ("SYS_HAS_GPS", "EKF2_GPS_CTRL")}
 REQUEST_MESSAGE, RUN_CHECKS, ORIGIN = 512, 401, 49  # MAV_CMD, MAV_CMD, GPS_GLOBAL_ORIGIN
-SAYS_S = 3.0  # of listening to what it says of arming: chosen, its checks run each second
+SAYS_S = 3.0  # of listening to its messages on arming: chosen, its checks run each second
 TRIES, ANSWER_S = 4, 1.0
 REFUSAL = ("prearm", "arm:", "preflight", "visodom", "arming denied", "no position")  # words of a refusal
 CURED = ("visodom: not healthy",)  # what ends when flownav sends
@@ -32,7 +32,7 @@ class Readiness(NamedTuple):
 
 
 def has_no_gps(make: str, values: dict[str, Value]) -> bool:
-    """Whether the vehicle's parameters say that it has no receiver."""
+    """Whether the vehicle's parameters state that it has no receiver."""
     told = [values[name].number for name in RECEIVERS.get(make, ()) if name in values]
     return any(number == 0.0 for number in told)
 
@@ -76,7 +76,7 @@ def set_origin(talk: Talk, place: Place) -> Place | None:
 
 
 def readiness(talk: Talk, make: str, values: dict[str, Value], origin: Place | None = None) -> Readiness:
-    """What is missing to arm. origin: to be set where the vehicle is disarmed."""
+    """The conditions that are missing to arm. origin: to be set where the vehicle is disarmed."""
     without = has_no_gps(make, values)
     assert talk.vehicle is not None
     place = set_origin(talk, origin) if origin is not None and talk.armed is False else None
@@ -91,7 +91,7 @@ def readiness(talk: Talk, make: str, values: dict[str, Value], origin: Place | N
 
 
 def said_of_arming(talk: Talk) -> list[str]:
-    """What the autopilot says of arming when it is asked to run its checks, each once; nothing of one that is armed."""
+    """The autopilot's messages about arming when it is asked to run its checks, each once; none where it is armed."""
     assert talk.vehicle is not None
     if talk.armed is not False:
         return []

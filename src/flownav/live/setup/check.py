@@ -1,4 +1,4 @@
-"""`flownav live --setup`: meet the vehicle, read, compare, write where asked to, and say what is to be done."""
+"""`flownav live --setup`: meet the vehicle, read, compare, write where asked to, and report what is to be done."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -22,7 +22,9 @@ ENABLING = ("VISO_TYPE", "PLND_ENABLED")  # ArduPilot shows the rest of the grou
 
 @dataclass
 class Report:
-    """What was found. verdict: one sentence; fits: whether nothing must change; refused: why nothing was written."""
+    """The result of the check. verdict: one sentence; fits: whether nothing must change; refused: why nothing was
+    written.
+    """
 
     verdict: str
     fits: bool = False
@@ -89,8 +91,8 @@ def check(
     values = read(talk, known.names(send) + receivers + (port_names(known.serial_parameters) if uart else []))
     if not values:
         return Report(
-            f"the {known.name} vehicle is heard but answers no request for a parameter: a router or a signing key "
-            "between us may keep it from hearing us",
+            f"the {known.name} vehicle is received but answers no request for a parameter: a router or a signing key "
+            "between us may keep our requests from reaching it",
             make=known.name, vehicle=vehicle, armed=talk.armed, send=send,
         )  # fmt: skip
     report = _compared(known, values, send, asked_set, address if uart else None)
@@ -130,7 +132,7 @@ def _compared(
     fits = not wrong and not blocks
     notes = list(known.notes) if by_estimate else []
     if any(row.name in ENABLING and row.status == "wrong" for row in rows):
-        notes.insert(0, f"What is absent may appear once {' or '.join(ENABLING)} is set: run this again then.")
+        notes.insert(0, f"Absent parameters may appear once {' or '.join(ENABLING)} is set: run this again then.")
     unusual = sum(row.status == "unusual" for row in rows)
     verdict = (
         f"{known.name}{FITS} `--send {send}`" + (f"; {unusual} values are not what is advised" if unusual else "")
@@ -177,7 +179,7 @@ def _nobody(talk: Talk, meet_s: float) -> str:
     heard = ", ".join(f"{name} {count}" for name, count in sorted(counts.items()))
     if heard:
         return (
-            f"no autopilot's HEARTBEAT in {meet_s:.0f} s, though something is heard ({heard}): "
+            f"no autopilot's HEARTBEAT in {meet_s:.0f} s, though something is received ({heard}): "
             "see --system, --component, --signing-key and the baud rate"
         )
-    return f"nothing was heard in {meet_s:.0f} s: check cable, port and baud rate, and where the vehicle sends to"
+    return f"nothing was received in {meet_s:.0f} s: check cable, port and baud rate, and where the vehicle sends to"

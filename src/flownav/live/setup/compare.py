@@ -1,6 +1,6 @@
-"""A vehicle's parameters held against what flownav needs: rows, what blocks arming, and the serial port.
+"""A vehicle's parameters compared with those that flownav needs: rows, what blocks arming, and the serial port.
 
-The port that we speak over is found by its baud rate.
+The port in use is found by its baud rate.
 """
 
 from typing import NamedTuple
@@ -27,7 +27,7 @@ class Port(NamedTuple):
 
 
 def port_names(family: str) -> list[str]:
-    """What is asked of the vehicle to find the port."""
+    """The parameters that are read from the vehicle to find the port."""
     if family == "SERIAL":
         return [f"SERIAL{n}_{what}" for n in ARDUPILOT_PORTS for what in ("PROTOCOL", "BAUD")]
     instances = [f"MAV_{n}_{what}" for n in PX4_INSTANCES for what in ("CONFIG", "MODE", "RATE")]
@@ -43,7 +43,7 @@ def baud_of(number: float) -> int:
 
 
 def port_of(family: str, values: dict[str, Value], baud: int) -> Port:
-    """The ports that speak MAVLink at our baud rate, and what is wanted of them."""
+    """The ports with MAVLink at our baud rate, and the values wanted for them."""
     return _serial(values, baud) if family == "SERIAL" else _instances(values, baud)
 
 
@@ -182,7 +182,7 @@ def _words(row: Wanted) -> str:
 
 
 def blocks_of(known: Knowledge, values: dict[str, Value]) -> list[Block]:
-    """What keeps the vehicle from arming, of what is known here."""
+    """Blocks to arming that follow from the known rules and the vehicle's values."""
 
     def words(rule: Arming, name: str) -> str:
         needed = f"; {rule.needs} is {values[rule.needs].number:g}" if rule.needs else ""

@@ -1,4 +1,4 @@
-"""What flownav needs of a make's parameters: data/setup/*.toml, checked, with the sentence that says it."""
+"""The parameters that flownav needs of each make: data/setup/*.toml, checked, with the sentence that explains each."""
 
 from typing import Literal
 
@@ -33,7 +33,7 @@ class Rule(ParameterModel):
         )
 
     def words(self) -> str:
-        """What is wanted, in a few words; "" where anything fits."""
+        """The wanted value in a few words; "" where any value fits."""
         said = [" or ".join(f"{wanted:g}" for wanted in self.one_of)] if self.one_of else []
         said += [f"not {' nor '.join(f'{refused:g}' for refused in self.exclude)}"] if self.exclude else []
         if self.at_least is not None and self.at_most is not None:
@@ -136,5 +136,5 @@ class Knowledge(ParameterModel):
 
 
 def knowledge_of(make: int) -> Knowledge | None:
-    """What is known of a make (MAV_AUTOPILOT); None where nothing is."""
+    """The known rules of a make (MAV_AUTOPILOT); None where there are none."""
     return load(shipped(MAKES[make]), Knowledge) if make in MAKES else None

@@ -16,7 +16,7 @@ from flownav.logs.mavlink.signing import sign_outgoing
 
 ARMED_FLAG = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 BETTER_S = 2.5  # for an autopilot beside a gimbal that says it is one: chosen, two HEARTBEATs
-FRESH_S = 3.0  # an older HEARTBEAT does not say whether the vehicle is armed: chosen, three of them
+FRESH_S = 3.0  # an older HEARTBEAT does not show whether the vehicle is armed: chosen, three of them
 WAIT_S = 0.02  # chosen
 HEARTBEAT_S = 1.0
 AT_ONCE = 4  # requests under way: an autopilot's queue is short, and so is a slow link's; chosen
@@ -27,7 +27,7 @@ UNKNOWN_PARAMETER = 1  # MAV_PARAM_ERROR_DOES_NOT_EXIST
 
 
 class Talk:
-    """Who is spoken with, and what is said. clock and wait are the machine's unless a test gives its own."""
+    """The exchange of messages with a vehicle. clock and wait are the machine's unless a test gives its own."""
 
     def __init__(
         self,
@@ -48,7 +48,7 @@ class Talk:
 
     @property
     def vehicle(self) -> Vehicle | None:
-        """The first autopilot that was heard."""
+        """The first autopilot that was received."""
         return self.reception.vehicle
 
     @property
@@ -97,7 +97,9 @@ class Talk:
 
 
 class Change(NamedTuple):
-    """A parameter that was to be written. after: what the vehicle says it has now, None where it did not answer."""
+    """A parameter that was to be written. after: the value that the vehicle reports now, None where it did not
+    answer.
+    """
 
     name: str
     before: float
@@ -148,7 +150,7 @@ def read(talk: Talk, names: list[str], limit_s: float = LIMIT_S) -> dict[str, Va
 
 
 def write(talk: Talk, name: str, before: Value, number: float) -> Change | str:
-    """Set a parameter and wait until the vehicle says it has it. A sentence where it is not written at all."""
+    """Set a parameter and wait until the vehicle reports the new value. A sentence where it is not written at all."""
     vehicle = talk.vehicle
     assert vehicle is not None
     try:
@@ -173,5 +175,5 @@ def write(talk: Talk, name: str, before: Value, number: float) -> Change | str:
 def why_not(talk: Talk) -> str:
     """Why nothing is written to the vehicle now; "" where it may be."""
     if talk.armed is None:
-        return "nothing is written: the vehicle's HEARTBEAT is too old to say that it is disarmed"
+        return "nothing is written: the vehicle's HEARTBEAT is too old to show that it is disarmed"
     return "nothing is written while the vehicle is armed: disarm it first" if talk.armed else ""

@@ -1,1 +1,1 @@
-"""A real autopilot's simulator, flown on flownav's estimate: its program, its ground station, its faults, its score."""
+"""Flights of a real autopilot's simulator on flownav's estimate: its program, ground station, faults and score."""

@@ -31,7 +31,7 @@ class ArduPilot(Pilot):
     log_pattern: ClassVar = "logs/*.BIN"
 
     def connected(self) -> Wire:
-        """Ports of our own, which the simulator is told."""
+        """A wire on free ports of our own, which are given to the simulator."""
         return Wire(free_port(), seed=self.case.seed)
 
     def start(self) -> None:
@@ -59,19 +59,19 @@ class ArduPilot(Pilot):
         for _ in range(2):
             self.streams(STREAMS_HZ)
         if not self.wire.until(lambda: self.wire.history.truth, 10.0):
-            raise NotFlown("the simulator does not tell the truth (SIM_STATE)")
+            raise NotFlown("the simulator does not send the truth (SIM_STATE)")
         if case.gps == "never":
             self.wire.pump(6.0)
             self._origin()
 
     def _origin(self) -> None:
-        """A vehicle without GPS is told where it is, as a ground station does it."""
+        """Send a vehicle without GPS its origin, as a ground station does."""
         latitude, longitude, altitude_m = self.wire.history.truth[-1].state.position_deg_m
         place = round(latitude * 1e7), round(longitude * 1e7), round(altitude_m * 1e3)
         self.wire.say(self.wire.mav.set_gps_global_origin_encode(self.system, *place))
 
     def _channels(self, interlock: int, throttle: int) -> None:
-        """What the sticks say; the switch of modes is never moved, or it would choose one."""
+        """Set the stick channels; the mode switch is never moved, or it would choose a mode."""
         self.channels = [*STICKS[:THROTTLE], throttle, *STICKS[THROTTLE + 1 : INTERLOCK], interlock]
 
     channels: Sequence[int] = STICKS
@@ -110,7 +110,7 @@ class ArduPilot(Pilot):
         self.wire.pump(4.0)
 
     def fly_on_flownav(self) -> None:
-        """The second set of sources, said again: at its first start an ArduPilot that has a flow sensor writes optical
+        """Set the second set of sources again: at its first start an ArduPilot that has a flow sensor writes optical
         flow into it (`NavEKF3::convert_parameters`), whatever its defaults say.
         """
         if self.case.gps == "never":

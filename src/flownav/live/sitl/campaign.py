@@ -32,7 +32,7 @@ TARGETS = {"heli": "heli", "copter": "copter", "quad": ""}
 
 
 def program_of(autopilot: str, vehicle: str, given: Path | None) -> Path:
-    """The user's own simulator: given, of the environment, or on the PATH. InputError that says how one gets it."""
+    """The user's own simulator: given, of the environment, or on the PATH. InputError that explains how to get it."""
     variable, name = ENVIRONMENT[autopilot], PROGRAMS[vehicle]
     get = GET[autopilot].format(target=TARGETS[vehicle])
     if given is not None:
@@ -98,7 +98,7 @@ def opened(folder: Path, plan: dict[str, Any]) -> None:
 
 
 def flown(tasks: Sequence[Task], beside: int, done: Callable[[int], None]) -> Iterator[tuple[Task, dict[str, Any]]]:
-    """Fly what is not there yet, so many beside each other; figures as they come."""
+    """Fly the tasks that have no result yet, `beside` at a time; yields figures as they come."""
     left = []
     for task in tasks:
         if task.path.is_file():
@@ -133,7 +133,7 @@ def a_slot() -> Iterator[int]:
         finally:
             os.close(held)
         return
-    raise InputError(f"{MOST_SLOT} simulators are flown on this machine already; wait for one")
+    raise InputError(f"{MOST_SLOT} simulators already fly on this machine; wait for one")
 
 
 def _one(task: Task) -> dict[str, Any]:

@@ -1,5 +1,5 @@
-"""Sensors that a simulator lacks, looking at its truth: a flow sensor, told as MAVLink's OPTICAL_FLOW_RAD, and a second
-receiver of GPS, told as HIL_GPS.
+"""Sensors that a simulator lacks, made from its truth: a flow sensor, sent as MAVLink's OPTICAL_FLOW_RAD, and a second
+GPS receiver, sent as HIL_GPS.
 """
 
 import random
@@ -17,7 +17,7 @@ from flownav.logs.mavlink.messages import TrueState
 
 COMPONENT = 158  # MAV_COMP_ID_PERIPHERAL
 ONBOARD = 18  # MAV_TYPE
-EXPOSURE_S, DELAY_S = 0.02, 0.02  # 50 Hz, told 20 ms later
+EXPOSURE_S, DELAY_S = 0.02, 0.02  # 50 Hz, sent 20 ms later
 NOISE_RAD_S, GYRO_NOISE_RAD_S = 0.05, 0.003  # settings.flow_sigma_rad_s, and a quiet gyro
 LENS_M = 0.1  # the lens above the ground on its legs
 QUALITY = 200
@@ -43,7 +43,7 @@ class FlowSensor:
         wire.turns.append(self.turn)
 
     def turn(self, now_s: float) -> None:
-        """Look at what truth has come, and tell what is due."""
+        """Look at the truth that has come, and send the readings that are due."""
         news = self._wire.history.truth[self._seen :]
         self._seen += len(news)
         for truth in news:
@@ -82,7 +82,7 @@ class FlowSensor:
 
 
 class Receiver:
-    """A second receiver of GPS, which speaks while its state says by how much it is off, and is good else."""
+    """A second GPS receiver, which sends fixes while its state has an error, off by that and otherwise good."""
 
     def __init__(self, wire: Wire, system: int) -> None:
         self.state = Eyes()
@@ -91,7 +91,7 @@ class Receiver:
         wire.turns.append(self.turn)
 
     def turn(self, now_s: float) -> None:
-        """Tell a fix where one is due."""
+        """Send a fix where one is due."""
         off_m = self.state.gps_north_m
         if off_m is None or now_s - self._said_s < FIX_S or not self._wire.history.truth:
             return

@@ -30,8 +30,8 @@ SIDE_M = 10.0
 
 
 class Scenario(NamedTuple):
-    """What is flown: seconds of hover, and whether a square follows. gps: what becomes of it, if nobody says. pad:
-    whether a camera sees one where the vehicle took off.
+    """The scenario of a flight: seconds of hover, and whether a square follows. gps: its case unless the order names
+    one. pad: whether a camera sees one where the vehicle took off.
     """
 
     hover_s: float
@@ -178,7 +178,7 @@ class _Flight:
             self.wire.kept = self.recording.take
 
     def flown(self) -> Flown:
-        """The whole of it, whatever becomes of it."""
+        """Fly the whole flight, and return its result however it ends."""
         why, landed = "", False
         try:
             landed = self.steps()
@@ -210,7 +210,7 @@ class _Flight:
         self.live = Live(self.wire.live_port, record, arguments)
 
     def steps(self) -> bool:
-        """What the scenario says; whether it landed."""
+        """Fly the scenario's steps; whether the vehicle landed."""
         scenario, pilot, case = SCENARIOS[self.order.scenario], self.pilot, self.order.case
         self.mark("start")
         pilot.start()
@@ -252,7 +252,7 @@ class _Flight:
 
     # -- faults ------------------------------------------------------------------------------------------------
     def strike(self, now_s: float) -> None:
-        """What is due of the faults, from the hover on."""
+        """Start and end the faults that are due, from the hover on."""
         if self.busy or not self.due or not self.marks or all(mark.name != "hover" for mark in self.marks):
             return
         since_s = next(mark.now_s for mark in self.marks if mark.name == "hover")

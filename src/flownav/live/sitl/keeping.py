@@ -1,4 +1,4 @@
-"""What went over the companion's line, kept as a recording that tests and `flownav replay` can play.
+"""The traffic of the companion's line, kept as a recording that tests and `flownav replay` can play.
 
 from_vehicle.tlog as it reached flownav, from_flownav.tlog as it left (8 bytes of UNIX microseconds, big-endian, before
 each frame), truth.csv on the vehicle's time since boot.

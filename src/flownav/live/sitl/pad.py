@@ -1,4 +1,4 @@
-"""A camera that a simulator lacks: looks down at a pad where the vehicle took off, and tells it as LANDING_TARGET."""
+"""A camera that a simulator lacks: looks down at a pad where the vehicle took off, and sends it as LANDING_TARGET."""
 
 import math
 import random
@@ -18,7 +18,7 @@ ANGLE_NOISE, DISTANCE_NOISE = 0.005, 0.02  # of a tangent; of the distance
 
 
 class PadCamera:
-    """Tells the pad, ten times a second, while it is in sight: angles and distance."""
+    """Sends the pad, ten times a second, while it is in sight: angles and distance."""
 
     def __init__(self, wire: Wire, system: int, seed: int) -> None:
         self._wire, self._mav = wire, coder(system, COMPONENT)
@@ -28,7 +28,7 @@ class PadCamera:
         wire.turns.append(self.turn)
 
     def turn(self, now_s: float) -> None:
-        """Tell the pad where a picture is due and it is in it."""
+        """Send the pad where a picture is due and shows it."""
         truth = self._wire.history.truth
         if not truth or now_s - self._told_s < EVERY_S:
             return

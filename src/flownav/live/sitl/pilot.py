@@ -32,8 +32,8 @@ class NotFlown(Exception):
 
 
 class Case(NamedTuple):
-    """What a flight's vehicle is given. gps: `on`, `cut` once it hovers, or `never`; wind_m_s from wind_deg; heading at
-    the start [deg]; send: what flownav sends; pad: whether it lands on one that a camera sees.
+    """The conditions of a flight. gps: `on`, `cut` once it hovers, or `never`; wind_m_s from wind_deg; heading at
+    the start [deg]; send: the message that flownav sends; pad: whether it lands on one that a camera sees.
     """
 
     vehicle: str
@@ -81,7 +81,7 @@ class Pilot(ABC):
 
     @abstractmethod
     def start(self) -> None:
-        """Start the simulator, and wait until it is heard. NotFlown where it is not."""
+        """Start the simulator, and wait until it is received. NotFlown where it is not."""
 
     @abstractmethod
     def take_off(self, height_m: float) -> None:
@@ -89,7 +89,7 @@ class Pilot(ABC):
 
     @abstractmethod
     def fly_on_flownav(self) -> None:
-        """From now on flownav's estimate is what it flies on."""
+        """Make the autopilot use flownav's estimate from now on."""
 
     @abstractmethod
     def lose_gps(self) -> None:
@@ -166,7 +166,7 @@ class Pilot(ABC):
         return None
 
     def value_of(self, name: str) -> Value | None:
-        """A parameter as the vehicle tells it."""
+        """A parameter's value as the vehicle reports it."""
         for _ in range(TRIES):
             self._values.pop(name, None)
             self.wire.say(request_read(self.wire.mav, self.system, 1, name))
@@ -175,7 +175,7 @@ class Pilot(ABC):
         return None
 
     def set(self, **parameters: float) -> None:
-        """Set parameters, each until the vehicle says so. NotFlown where it does not."""
+        """Set parameters, each until the vehicle confirms it. NotFlown where it does not."""
         make = int(self.wire.latest["HEARTBEAT"].autopilot)
         for name, number in parameters.items():
             self._set(name, number, make)

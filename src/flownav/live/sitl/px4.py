@@ -56,7 +56,7 @@ class Px4(Pilot):
             raise NotFlown(f"no HEARTBEAT; {self.folder / 'simulator.txt'} has the simulator's words")
         self.streams({HIL_STATE: TRUTH_HZ, LOCAL: LOCAL_HZ})
         if not self.wire.until(lambda: self.wire.history.truth, 10.0):
-            raise NotFlown("the simulator does not tell the truth (HIL_STATE_QUATERNION)")
+            raise NotFlown("the simulator does not send the truth (HIL_STATE_QUATERNION)")
 
     def _mode(self, main: int, sub: int = 0) -> bool:
         for _ in range(3):
@@ -83,7 +83,7 @@ class Px4(Pilot):
         self.wire.pump(4.0)
 
     def fly_on_flownav(self) -> None:
-        """EKF2 fuses no GPS; the receiver stays on, and flownav hears it."""
+        """EKF2 fuses no GPS; the receiver stays on, and flownav receives it."""
         if self.case.gps != "never":
             self.set(EKF2_GPS_CTRL=0)
 

@@ -1,4 +1,4 @@
-"""What a flight came to: how well it held, how far off the estimate was while it was sent, whether it landed where."""
+"""The score of a flight: hover accuracy, error of the estimate while it was sent, and where it landed."""
 
 import math
 from typing import Any
@@ -13,7 +13,7 @@ from flownav.logs.mavlink.position_messages import local_position_m
 GAP_S = 0.3  # a longer one between two estimates is one of sending
 WRONG_M = 1.0  # so far off, an estimate is wrong
 HIGH_M, TILTED = 0.5, 0.8  # landed is lower than this, and upright: the cosine of its tilt
-SETTLED_S = 3.0  # after a change of what the autopilot flies on
+SETTLED_S = 3.0  # after a change of the estimate in use
 NAN = float("nan")
 
 
@@ -89,7 +89,7 @@ def _of_estimate(flown: Flown, truth: Array, hover_s: float, until_s: float, end
 
 
 def _of_autopilot(flown: Flown, truth: Array, hover_s: float, until_s: float) -> dict[str, Any]:
-    """What the autopilot itself believed of its place in the hover, less what it was off when that began."""
+    """Error of the autopilot's own position in the hover, less its error when the hover began."""
     own = np.array([(now_s, *state.pos_ned_m) for now_s, state in flown.history.local]).reshape(-1, 4)
     own = own[(own[:, 0] >= hover_s + SETTLED_S) & (own[:, 0] < until_s)]
     if len(own) < 2:
@@ -100,7 +100,7 @@ def _of_autopilot(flown: Flown, truth: Array, hover_s: float, until_s: float) ->
 
 
 def _of_live(flown: Flown) -> dict[str, Any]:
-    """What the sessions say of themselves."""
+    """Figures from the sessions' own summaries."""
     last = flown.lives[-1] if flown.lives else {}
     ran_s, cpu_s = (sum(live[name] for live in flown.lives) for name in ("ran_s", "cpu_s"))
     return {

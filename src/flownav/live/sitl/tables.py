@@ -1,4 +1,4 @@
-"""What a make's simulator is told for a flight, and the faults that it can have: data/sitl/*.toml."""
+"""The parameters that a make's simulator is given for a flight, and its possible faults: data/sitl/*.toml."""
 
 from typing import Literal
 
@@ -10,9 +10,9 @@ Parameters = dict[str, float]
 
 
 class Eyes(ParameterModel):
-    """What goes wrong with sensors that flownav itself simulates, in place of what is right.
+    """Faults of the sensors that flownav itself simulates.
 
-    gyro_rad_s: of the flow sensor's own gyro about x. gps_north_m: a second receiver speaks, off by so much.
+    gyro_rad_s: of the flow sensor's own gyro about x. gps_north_m: offset of a second receiver.
     """
 
     flow_noise_rad_s: float | None = None
@@ -26,9 +26,10 @@ class Eyes(ParameterModel):
 
 
 class Fault(ParameterModel):
-    """A fault: parameters while it is on and once it is off, and what the line, the machine or our own sensors do.
+    """A fault: parameters while it is on and once it is off, and the faults of the line, the machine or our own
+    sensors.
 
-    lasts_s: where `--fault` says nothing else. gps: whether it needs one. loss: share of frames lost each way;
+    lasts_s: unless `--fault` gives another. gps: whether it needs one. loss: share of frames lost each way;
     freeze_s: the simulator stands still for so long; restart: flownav is killed and started again.
     """
 
@@ -43,12 +44,12 @@ class Fault(ParameterModel):
     eyes: Eyes | None = None
 
     def parameters(self, *, on: bool) -> Parameters:
-        """What is set when it begins or ends; parameters without an end are set back to 0."""
+        """The parameters to set when the fault begins or ends; parameters without an end value are set back to 0."""
         return self.on if on else {name: self.off.get(name, 0.0) for name in self.on}
 
 
 class Cases(ParameterModel):
-    """Parameters by what becomes of GPS, by vehicle, and of a landing on a pad; `all` in every flight."""
+    """Parameters by the use of GPS, by vehicle, and for a landing on a pad; `all` in every flight."""
 
     all: Parameters
     heli: Parameters = Field(default_factory=dict)
@@ -72,7 +73,7 @@ def table_of(make: str) -> Table:
 
 
 def parameters_of(make: str, vehicle: str, gps: str, *, pad: bool = False) -> Parameters:
-    """What a flight's simulator is started with."""
+    """The parameters that a flight's simulator is started with."""
     cases = table_of(make).parameters
     return {**cases.all, **getattr(cases, vehicle, {}), **getattr(cases, gps), **(cases.pad if pad else {})}
 

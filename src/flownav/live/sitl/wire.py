@@ -1,7 +1,7 @@
 """The two links of a simulated vehicle, on loopback: a ground station's, and a companion's, which is watched.
 
-One loop serves both: what the autopilot tells its companion goes on to flownav and back, frame by frame, with what the
-line does to it; estimates are noted as they leave, and what the ground station hears goes to who asks for it.
+One loop serves both: the autopilot's messages to its companion go on to flownav and back, frame by frame, with the
+line's faults; estimates are noted as they leave, and the ground station's messages go to all that ask for them.
 """
 
 import math
@@ -22,10 +22,10 @@ from flownav.logs.mavlink.outgoing import ARMED
 HOST = "127.0.0.1"
 STATION = (255, 190)  # the ground station's system, and MAV_COMP_ID_MISSIONPLANNER
 GCS, INVALID = 6, 8  # MAV_TYPE, MAV_AUTOPILOT
-BEAT_S, TURN_S = 0.1, 0.02  # of what is said again and again; chosen
+BEAT_S, TURN_S = 0.1, 0.02  # of messages that are repeated; chosen
 ODOMETRY, SPEED, VISION = 331, 103, 102
 LARGEST = 65536
-STAMPED = 35  # SO_TIMESTAMPNS of Linux: the kernel says when a datagram arrived
+STAMPED = 35  # SO_TIMESTAMPNS of Linux: the kernel's time of a datagram's arrival
 NAN = float("nan")
 
 
@@ -40,14 +40,14 @@ class Told(NamedTuple):
 
 
 class Truth(NamedTuple):
-    """What a simulator says is so, when it arrived."""
+    """A simulator's true state, and when it arrived."""
 
     now_s: float
     state: TrueState
 
 
 class History:
-    """What happened in a flight: truth, what flownav said, what the autopilot believed, words, on our clock [s]."""
+    """The events of a flight: truth, flownav's messages, the autopilot's estimates, texts, on our clock [s]."""
 
     def __init__(self) -> None:
         self.truth: list[Truth] = []
@@ -62,7 +62,7 @@ class History:
 
 
 class Line:
-    """What the companion's line does to frames: loses a share of them, or all while it is cut."""
+    """The faults of the companion's line: it loses a share of frames, or all while it is cut."""
 
     def __init__(self, seed: int) -> None:
         self.loss, self.cut = 0.0, False
@@ -76,8 +76,8 @@ class Line:
 class Wire:
     """The sockets of one flight.
 
-    station_peer: where the autopilot listens for a ground station; None: who speaks first. companion_port: where the
-    autopilot sends what is for its companion, 0 for any; live_port: where flownav listens.
+    station_peer: where the autopilot listens for a ground station; None: the first sender. companion_port: where the
+    autopilot sends to its companion, 0 for any; live_port: where flownav listens.
     """
 
     def __init__(self, live_port: int, companion_port: int = 0, station_peer: int | None = None, seed: int = 1) -> None:
@@ -88,8 +88,8 @@ class Wire:
         self._vehicle_peer: Any = None
         self._frames, self._coder, self._mav = StreamFrames(), coder(), coder(*STATION)
         self.latest: dict[str, Message] = {}
-        self.heard: list[Callable[[Message], None]] = []  # who is told of each message of the autopilot
-        self.beats: list[Callable[[Any], list[Message]]] = []  # what is said ten times a second
+        self.heard: list[Callable[[Message], None]] = []  # called with each message of the autopilot
+        self.beats: list[Callable[[Any], list[Message]]] = []  # messages that are sent ten times a second
         self.turns: list[Callable[[float], None]] = []  # what is done each turn of the loop
         self.kept: Callable[[bytes, bool], None] | None = (
             None  # who keeps the frames that pass, and whether to the vehicle
@@ -129,7 +129,7 @@ class Wire:
             self.turn(min(left_s, TURN_S))
 
     def until(self, so: Callable[[], Any], limit_s: float) -> bool:
-        """Let time pass until something is so; whether it came."""
+        """Let time pass until `so()` is true; whether it came true."""
         end_s = time.monotonic() + limit_s
         while not so():
             if time.monotonic() >= end_s:
@@ -165,7 +165,7 @@ class Wire:
             for message in what(self._mav):
                 self.say(message)
 
-    # -- what is heard -----------------------------------------------------------------------------------------
+    # -- reception -----------------------------------------------------------------------------------------------
     def _hear(self, piece: bytes, now_s: float) -> None:
         for frame, content in self._frames.feed(piece, whole=True):
             if frame.component != 1:

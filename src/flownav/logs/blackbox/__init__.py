@@ -1,1 +1,1 @@
-"""Blackbox logs of Betaflight and INAV: `header` what a log says of itself, `frames` its frames, `reader` the Log."""
+"""Blackbox logs of Betaflight and INAV: `header` a log's own description, `frames` its frames, `reader` the Log."""

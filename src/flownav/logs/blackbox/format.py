@@ -1,9 +1,9 @@
 """How a blackbox log is written: the text at its start, and how numbers are packed, in compiled functions.
 
-The text says the fields of each kind of frame, how they are packed, and settings (betaflight/betaflight,
+The text states the fields of each kind of frame, how they are packed, and settings (betaflight/betaflight,
 src/main/blackbox/blackbox.c: blackboxHeader, sendFieldDefinition, blackboxWriteSysinfo; INAV descends from it). A file
 may hold several logs, one for each time the vehicle was armed. src/main/blackbox/blackbox_encoding.c writes the
-numbers: each function takes the bytes and a place, and gives the place after; -1 says that the bytes end before.
+numbers: each function takes the bytes and a place, and gives the place after; -1 means that the bytes end before.
 """
 
 import struct
@@ -111,7 +111,7 @@ def _header(content: bytes, start: int, end: int) -> Header | None:
 
 
 def _fields(lines: dict[str, str], letter: str, names: tuple[str, ...] = ()) -> Fields:
-    """What the lines say of a kind of frame; empty where they do not, or cannot be."""
+    """The fields of a kind of frame as the header lines define them; empty where they do not, or cannot be."""
     names = names or tuple(filter(None, lines.get(f"Field {letter} name", "").split(",")))
     predictors, encodings = (_codes(lines.get(f"Field {letter} {what}", "")) for what in ("predictor", "encoding"))
     sound = 0 < len(names) <= MOST_FIELDS and len(names) == len(predictors) == len(encodings)
@@ -154,13 +154,13 @@ def signed_vb(content: Bytes, pos: int, end: int) -> tuple[int, int]:
 
 @kernel
 def sign_extended(value: int, bits: int) -> int:
-    """A number of so many bits in two's complement."""
+    """A number of `bits` bits in two's complement."""
     return value - (1 << bits) if value & (1 << (bits - 1)) else value
 
 
 @kernel
 def sized(content: Bytes, pos: int, end: int, selector: int, count: int, out: Numbers) -> int:
-    """`count` signed numbers of 1 to 4 bytes, lowest first; two bits of the selector say how many each has."""
+    """`count` signed numbers of 1 to 4 bytes, lowest first; two bits of the selector give the size of each."""
     for k in range(count):
         width = ((selector >> (2 * k)) & 3) + 1
         if pos + width > end:
@@ -175,7 +175,7 @@ def sized(content: Bytes, pos: int, end: int, selector: int, count: int, out: Nu
 
 @kernel
 def tag2_3(content: Bytes, pos: int, end: int, variable: bool, out: Numbers) -> int:
-    """Three numbers after two bits that say their size: 2, 4 and 6 bits each (or 5-5-4, 8-7-7), or whole bytes."""
+    """Three numbers after two bits that give their size: 2, 4 and 6 bits each (or 5-5-4, 8-7-7), or whole bytes."""
     if pos >= end:
         return -1
     lead = int(content[pos])

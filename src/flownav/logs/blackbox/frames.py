@@ -54,7 +54,7 @@ class Earlier(NamedTuple):
 
 
 class Base(NamedTuple):
-    """What else values are counted from: the header's levels, home, the main frames' clock. part: scratch."""
+    """The other bases of values: the header's levels, home, the main frames' clock. part: scratch."""
 
     levels: Numbers
     home: Numbers
@@ -74,8 +74,8 @@ class Memory(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """What is kept: main (most, fields taken) int32, clocks (most,) of the main frames' times, unwrapped, and gps
-    (most, fields + 1) with the time last.
+    """The rows that are kept: main (most, fields taken) int32, clocks (most,) of the main frames' times, unwrapped, and
+    gps (most, fields + 1) with the time last.
     """
 
     main: NDArray[np.int32]
@@ -244,7 +244,7 @@ def decode(
     home, part = np.zeros(2, np.int64), np.zeros(AT_MOST, np.int64)
     rows, fixes, damaged = 0, 0, 0
     sound, homed = False, True
-    for k in range(fixed):  # positions counted from a home that is not told yet are none
+    for k in range(fixed):  # positions relative to a home that is not known yet are none
         homed = homed and kinds.g.predictors[k] != 7 and kinds.g.predictors[k] != 12
     clock, high = 0, 0  # the last main frame's time as it is written, and what its 32 bits have lost
     pos = start

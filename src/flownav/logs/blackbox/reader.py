@@ -1,14 +1,14 @@
-"""A blackbox log of Betaflight or INAV as a Log. docs/reference/blackbox.md says which fields are read.
+"""A blackbox log of Betaflight or INAV as a Log. docs/reference/blackbox.md lists the fields that are read.
 
 Axes: both firmwares have body forward-left-up and an earth north-west-up: a gyro that turns the nose down is positive,
-the accelerometer says +1 G on z at rest, and `attitude` has pitch positive nose down and yaw clockwise
+the accelerometer reads +1 G on z at rest, and `attitude` has pitch positive nose down and yaw clockwise
 (src/main/flight/imu.c, imuUpdateEulerAngles: pitch is the arc sine of -rMat[2][0]). INAV's `navPos`, `navVel` are
 north, east, up (src/main/navigation/navigation.h).
 
 INAV's flow stands in `debug` where debug_mode is FLOW_RAW (2, src/main/build/debug.h): flow and body rates about x
 and y [deg/s] in whole numbers (src/main/sensors/opflow.c). Its estimator has forward speed -(flow_y - body_y) h and
-left speed (flow_x - body_x) h (navigation_pos_estimator_flow.c): FRD's flow_x is the same, flow_y of other sign. What
-Betaflight writes of its flow sensor (debug OPTICALFLOW) changes its meaning between versions, and is not read.
+left speed (flow_x - body_x) h (navigation_pos_estimator_flow.c): FRD's flow_x is the same, flow_y of other sign.
+Betaflight's flow (debug OPTICALFLOW) changes its meaning between versions, and is not read.
 """
 
 from pathlib import Path

@@ -102,9 +102,9 @@ class DataFlash:
         return [int(value) for value in found] if found.dtype.kind in "iu" else []
 
     def times(self, name: str, *, instance: int | None = None) -> Array:
-        """When each message of a kind was written [s], seconds since the vehicle started; NaN where nothing says.
+        """When each message of a kind was written [s], seconds since the vehicle started; NaN where no time is known.
 
-        Of a kind without a time of its own, what the messages before it said.
+        A kind without a time of its own has that of the message before it.
         """
         known = self.formats[name]
         at = self._offsets(known)
@@ -230,7 +230,7 @@ def message_rows(
 
 
 def lacking(log: DataFlash, name: str, fields: Sequence[Field]) -> str:
-    """What a kind of message that occurs lacks to be read, in words; "" where it lacks nothing."""
+    """The part that a kind of message lacks to be read, in words; "" where it lacks nothing."""
     unfilled = _unfilled(log, name, fields)
     if unfilled:
         return f"a field that is needed ({', '.join(field.label for field in fields if field.required)})"

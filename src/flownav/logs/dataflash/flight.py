@@ -1,6 +1,6 @@
 """An ArduPilot DataFlash log (.bin) as a Log, with the autopilot's own estimate, a simulator's truth and parameters.
 
-docs/reference/dataflash.md says which messages are read and how.
+docs/reference/dataflash.md lists the messages that are read and how.
 """
 
 from pathlib import Path
@@ -60,7 +60,7 @@ def estimate_rows(log: DataFlash, settings: dict[str, float]) -> tuple[str, CsvT
 
 
 def _primary(log: DataFlash, name: str, table: CsvTable) -> Array:
-    """The core that flew at each row's time; the lowest one where the log does not say."""
+    """The core in use at each row's time; the lowest one where the log does not state it."""
     said = good_rows(log, name, (Field("PI", 0, 8),))
     if said is None:
         return np.full(len(table.t_s), table.columns["C"].min(initial=np.inf))
@@ -102,7 +102,7 @@ def truth(state: CsvTable, motion: CsvTable | None, origin: Origin) -> Table:
     """The truth at the times of SIM, about an origin.
 
     SIM2's position is finer than SIM's 1e-7 degrees but has the simulator's own origin: its median distance from
-    SIM's tells where that is.
+    SIM's gives that origin.
     """
     position = local_ned(state.matrix("Lat", "Lng", "Alt"), origin)
     velocity = np.full_like(position, np.nan)
@@ -120,7 +120,9 @@ def truth(state: CsvTable, motion: CsvTable | None, origin: Origin) -> Table:
 
 
 def stated_limits(settings: dict[str, float], rangefinder: int) -> dict[str, tuple[float, float]]:
-    """What the vehicle was told of its rangefinder (counted from 0): centimetres, metres since ArduPilot 4.7."""
+    """The range limits in the vehicle's parameters for its rangefinder (counted from 0): centimetres, metres since
+    ArduPilot 4.7.
+    """
     prefix = f"RNGFND{'123456789A'[rangefinder] if 0 <= rangefinder < 10 else ''}_"
     for low, high, metre in (("MIN", "MAX", 1.0), ("MIN_CM", "MAX_CM", 0.01)):
         least, most = settings.get(prefix + low, np.nan) * metre, settings.get(prefix + high, np.nan) * metre
@@ -136,7 +138,7 @@ def read_dataflash(path: Path, *, flow_instance: int | None = None) -> Log:
 
     flow_instance: which flow sensor, where the log has several; the one with most data by default. InputError where
     the file cannot be read or holds no sensor's message; where its clock restarts; where two sensors cannot be
-    right together. Bad rows are counted in `Stream.rejected`, unreadable bytes told in a note.
+    right together. Bad rows are counted in `Stream.rejected`, unreadable bytes stated in a note.
     """
     log = DataFlash(path)
     notes = _file_notes(log)
@@ -220,7 +222,7 @@ def _streams(tables: dict[str, CsvTable], origin: Origin | None, settings: dict[
 
 
 def _delay_s(settings: dict[str, float], names: tuple[str, ...], unit_s: float) -> float:
-    """A delay that the vehicle was told of; 0 where it was told none."""
+    """A delay that the vehicle's parameters state [s]; 0 where they state none."""
     stated = [settings[name] * unit_s for name in names if name in settings]
     return stated[0] if stated and 0.0 <= stated[0] <= LONGEST_DELAY_S else 0.0
 

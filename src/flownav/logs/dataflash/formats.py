@@ -1,4 +1,4 @@
-"""Where a DataFlash file's messages lie, and what the file says of them: FMT (layout), FMTU, UNIT and MULT (units).
+"""Where a DataFlash file's messages lie, and their description in the file: FMT (layout), FMTU, UNIT and MULT (units).
 
 A message is 0xA3 0x95, its type, and a body whose length its type alone decides. Two header bytes also occur inside
 bodies, so a header counts only where the chain of lengths arrives at it. Where the chain breaks (lost or damaged
@@ -184,7 +184,7 @@ class Format:
 
     @property
     def clock(self) -> tuple[str, float] | None:
-        """The field that says when, and its unit [s]; None of a message that does not say."""
+        """The field with the time, and its unit [s]; None of a message without one."""
         clocks = GPS_CLOCKS if self.name.startswith("GPS") else CLOCKS
         return next(((label, unit_s) for label, unit_s in clocks if label in self.numbers), None)
 
@@ -241,7 +241,9 @@ def records(content: Bytes, dtype: np.dtype[np.void]) -> NDArray[np.void]:
 
 
 def with_units(formats: dict[str, Format], tables: dict[str, NDArray[np.void]]) -> dict[str, Format]:
-    """The formats with what the FMTU, UNIT and MULT messages say of them; rows that fit no format are passed over."""
+    """The formats with units and factors from the FMTU, UNIT and MULT messages; rows that fit no format are passed
+    over.
+    """
     units = {chr(key & 0x7F): _text(label) for key, label in _pairs(tables, "UNIT", "Label")}
     factors = {chr(key & 0x7F): _rounded(factor) for key, factor in _pairs(tables, "MULT", "Mult")}
     stated = tables.get("FMTU")

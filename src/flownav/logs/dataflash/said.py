@@ -1,4 +1,4 @@
-"""What a DataFlash log says besides its sensors: parameters, modes, EKF3's source set, messages, clipping."""
+"""A DataFlash log's content besides its sensors: parameters, modes, EKF3's source set, messages, clipping."""
 
 from collections.abc import Iterator
 
@@ -22,7 +22,7 @@ from flownav.logs.happened import (
     messages,
 )
 
-SETTLED_S = 1.0  # parameters are written in one go when the log begins; what comes so long after the last was set
+SETTLED_S = 1.0  # the first ones are written in one go; one that comes this long after the last was set in flight
 SOURCES_BY_EVENT = {85: 1.0, 86: 2.0, 87: 3.0}  # AP_Logger's LogEvent: EK3_SOURCES_SET_TO_PRIMARY and on
 CLIPPING_S = 1.0
 VIBRATION_M_S2 = 5.0
@@ -35,7 +35,7 @@ def parameters(log: DataFlash) -> dict[str, float]:
 
 
 def happened(log: DataFlash, start_s: float) -> tuple[Happened, ...]:
-    """Everything that the log tells, in order of time; start_s: the vehicle's time at time 0 of the log."""
+    """All events of the log, in order of time; start_s: the vehicle's time at time 0 of the log."""
     rows = [*_set(log), *_modes(log), *_source_sets(log), *_clipping(log), *_vibration(log), *_messages(log)]
     return in_time(row._replace(t_s=float(row.t_s) - start_s) for row in rows)
 

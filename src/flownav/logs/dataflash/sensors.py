@@ -1,8 +1,8 @@
-"""What each sensor's messages become: streams in the units, frames and signs of `measurement`.
+"""Converts each sensor's messages to streams in the units, frames and signs of `measurement`.
 
 ArduPilot's OF message has PX4's convention already: flowX is the rate about body x with a still scene,
 flow_x = w_x - v_y / r, flow_y = w_y + v_x / r, bodyX and bodyY the gyro's rates over the same time
-(a simulated flight's truth bears that out: tests/logs/test_dataflash_flight.py).
+(a simulated flight's truth confirms it: tests/logs/test_dataflash_flight.py).
 """
 
 from collections.abc import Callable
@@ -72,7 +72,7 @@ FIELDS: dict[str, tuple[Field, ...]] = {
 
 
 def sensor_rows(log: DataFlash, flow_instance: int | None, notes: list[str]) -> dict[str, CsvTable]:
-    """Good rows of every sensor that the log has, of one instance each; says which where there are several."""
+    """Good rows of every sensor that the log has, of one instance each, with a note where there are several."""
     tables = {}
     for name, fields in FIELDS.items():
         instance = _chosen(log, name, flow_instance)

@@ -1,6 +1,6 @@
-"""What MAVLink tells of what the autopilot asked for, and of its battery: neither is fused, both stand on the page.
+"""The autopilot's set-points and battery in MAVLink messages: neither is fused, both stand on the page.
 
-Traps. A bit that is set in a `type_mask` says that a component is to be ignored. NAV_CONTROLLER_OUTPUT has no time of
+Traps. A bit that is set in a `type_mask` means that a component is to be ignored. NAV_CONTROLLER_OUTPUT has no time of
 its own; ArduCopter puts its target attitude into it (GCS_MAVLINK_Copter::send_nav_controller_output).
 """
 
@@ -21,14 +21,14 @@ UNKNOWN_MV = 65535
 
 
 class Asked:
-    """What one autopilot asked for so far, and its battery, message by message."""
+    """The set-points and battery of one autopilot so far, message by message."""
 
     def __init__(self, make: int) -> None:
         self._make = make
         self._rows: dict[str, list[tuple[float, ...]]] = {name: [] for name in ASKING}
 
     def take(self, t_s: float, message: Message) -> None:
-        """A message of ASKING at its log time [s]; what says nothing is left out."""
+        """A message of ASKING at its log time [s]; a message without set-points is left out."""
         row = self._values(message)
         if math.isfinite(t_s) and row is not None:
             self._rows[message.msgname].append((t_s, *row))
@@ -57,7 +57,7 @@ class Asked:
         return tuple(table for name, columns in each if (table := self._table(name, columns)) is not None)
 
     def battery(self) -> Table | None:
-        """The battery's voltage, current and what is left [%]; None where no voltage was told."""
+        """The battery's voltage, current and remaining charge [%]; None where no voltage was sent."""
         return self._table("SYS_STATUS", ("voltage_v", "current_a", "remaining_percent"))
 
     def _table(self, name: str, columns: tuple[str, ...]) -> Table | None:

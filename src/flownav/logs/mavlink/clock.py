@@ -26,13 +26,13 @@ CONFIRMATIONS = 3
 LONGEST_WAIT_S = 1.0  # an unstamped message follows its stamped predecessor by no more than this
 LONGEST_PAUSE_S = 86400.0  # arrivals further apart than this are a damaged arrival time
 CRYSTAL_DRIFT = 200e-6  # of one crystal against another
-SET_BACK_S, SET_FOR_S = 0.25, 1.0  # of another clock: all its stamps later by more, for so long, say that it was set
+SET_BACK_S, SET_FOR_S = 0.25, 1.0  # of another clock: all its stamps later by more, for this long, mean that it was set
 
 ClockName = tuple[int, int, str]  # system, component, "boot" or "unix"
 
 
 class Stamp(NamedTuple):
-    """What a message says of its time: on whose clock, how much [s], and at what that count wraps [s] (0: never)."""
+    """The time stamp of a message: whose clock, its time [s], and the time at which it wraps [s] (0: never)."""
 
     clock: ClockName
     stamp_s: float
@@ -63,7 +63,7 @@ class ClockState(NamedTuple):
     clocks: Mapping[ClockName, _Clock] = {}
 
     def now_s(self, arrival_s: float) -> float:
-        """The log's time at an arrival; NaN before the reference clock was heard."""
+        """The log's time at an arrival; NaN before the reference clock was received."""
         return self.log_s + min(max(arrival_s - self.arrival_s, 0.0), LONGEST_WAIT_S)
 
     @property
@@ -122,7 +122,7 @@ def _laid(before: _Clock, clock: _Clock, now: float, reading: float) -> _Clock:
 
 
 def told_unix_time(state: ClockState, clock: ClockName, unix_s: float, boot_s: float) -> ClockState:
-    """SYSTEM_TIME says both times of one instant: the UNIX clock's offset is then known without any wait."""
+    """SYSTEM_TIME has both times of one instant: the UNIX clock's offset is then known without any wait."""
     reference = state.clocks.get(state.reference)
     if reference is None or unix_s * 1e6 < UNIX_FROM_US:
         return state
@@ -131,7 +131,7 @@ def told_unix_time(state: ClockState, clock: ClockName, unix_s: float, boot_s: f
 
 
 def stamp_of(message: Message, system: int, component: int, reference_s: float = float("nan")) -> Stamp | None:
-    """What a message says of its time; None where it has no stamp, or 0, which means the same.
+    """The time stamp of a message; None where it has no stamp, or 0, which means the same.
 
     The trap: ArduPilot writes milliseconds since boot into OPTICAL_FLOW.time_usec. Of both readings the one nearer
     to the autopilot's clock (`reference_s`, seconds since boot) is right.

@@ -1,4 +1,4 @@
-"""What a message yields: measurements, and what was dropped and why. Absurd values never pass."""
+"""The result of converting a message: its measurements, and what was dropped and why. Absurd values never pass."""
 
 import math
 from collections.abc import Iterable
@@ -19,7 +19,7 @@ class Pose(NamedTuple):
 
 
 class Context(NamedTuple):
-    """What a message does not say of itself.
+    """Data that a message does not contain.
 
     ardupilot: its sender is an ArduPilot autopilot. autopilot: its sender is the autopilot, of whatever make.
     origin_deg_m: latitude, longitude [deg], altitude [m] of the local frame. pose: the vehicle's, where known.

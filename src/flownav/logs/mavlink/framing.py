@@ -10,7 +10,7 @@ payload, checksum, and a signature of 13 bytes where flag 1 is set.
 
 A parameter is one float field that two makes fill in two ways: ArduPilot casts every number to float; PX4 copies the
 bytes of an integer into the field (mavlink.io, services/parameter, "Parameter encoding": C-cast and bytewise).
-PARAM_VALUE says the type. Read as the other, PX4's 5 is 7e-45, and a 5.0 written to PX4 becomes 1084227584.
+PARAM_VALUE has the type. Read as the other, PX4's 5 is 7e-45, and a 5.0 written to PX4 becomes 1084227584.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 
 from flownav.core.errors import InputError
 
-# MAV_AUTOPILOT: who answers a HEARTBEAT; a ground station and a camera say that they are none
+# MAV_AUTOPILOT: the sender of a HEARTBEAT; a ground station and a camera state that they are none
 ARDUPILOT, PX4, INVALID_AUTOPILOT = 3, 12, 8
 
 Message = Any  # a message that pymavlink decoded or built
@@ -54,7 +54,7 @@ def coder(system: int = 1, component: int = 1) -> Any:
 
 # -- frames -------------------------------------------------------------------------------------------------
 class Frame(NamedTuple):
-    """Where a frame lies in the bytes (start, end), when it arrived [us], and what its header says."""
+    """Where a frame lies in the bytes (start, end), when it arrived [us], and the fields of its header."""
 
     start: int
     end: int

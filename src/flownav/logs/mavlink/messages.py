@@ -1,7 +1,7 @@
-"""From one decoded MAVLink message to measurements, by the table of who converts what, and to states.
+"""From one decoded MAVLink message to measurements, by the table of converters, and to states.
 
-Conversions are pure functions of the message, its log time and a Context. Units and traps stand with each. States are
-what an autopilot's estimator or a simulator says: LOCAL_POSITION_NED, GLOBAL_POSITION_INT; SIM_STATE and
+Conversions are pure functions of the message, its log time and a Context. Units and traps stand with each. States
+are outputs of an autopilot's estimator or a simulator: LOCAL_POSITION_NED, GLOBAL_POSITION_INT; SIM_STATE and
 HIL_STATE_QUATERNION, which are a simulator's truth. They are compared with, never fused.
 """
 
@@ -37,7 +37,7 @@ CONVERTERS: dict[str, Callable[[Message, float, Context], Iterator[Outcome]]] = 
     "EXTENDED_SYS_STATE": position_messages.extended_sys_state,
 }
 
-# where several messages tell of one sensor, the earlier is the finer or the more direct
+# where several messages hold one sensor, the earlier is the finer or the more direct
 PREFERENCE: dict[Sensor, tuple[str, ...]] = {
     Sensor.FLOW_RATE: ("OPTICAL_FLOW_RAD", "OPTICAL_FLOW"),
     Sensor.RANGE: ("DISTANCE_SENSOR", "RANGEFINDER", "OPTICAL_FLOW_RAD", "OPTICAL_FLOW"),
@@ -152,7 +152,7 @@ STATES: dict[str, Callable[[Message], LocalState | GlobalState | TrueState | Non
 
 # -- measurements -------------------------------------------------------------------------------------------
 def measurements(message: Message, t_s: float, context: Context) -> tuple[Outcome, ...]:
-    """What a message measures at its log time [s], and what of it was dropped and why; empty where nothing.
+    """The measurements in a message at its log time [s], and what of it was dropped and why; empty where nothing.
 
     A message of a kind that measures nothing yields nothing. Values that are not finite or that no vehicle can have
     are Dropped (`not_finite`, `out_of_range`, `not_unit`).
@@ -162,6 +162,6 @@ def measurements(message: Message, t_s: float, context: Context) -> tuple[Outcom
 
 
 def instance_of(message: Message) -> int:
-    """Which of several like sensors a message is of; 0 where it does not say."""
+    """Which of several like sensors a message is of; 0 where it does not state it."""
     name = INSTANCE_FIELD.get(message.msgname)
     return int(getattr(message, name)) if name else 0

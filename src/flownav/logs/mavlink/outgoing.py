@@ -1,7 +1,7 @@
-"""Messages that are sent: flownav's estimate to an autopilot, and what an autopilot tells, for a simulated vehicle.
+"""Messages that are sent: flownav's estimate to an autopilot, and an autopilot's messages, for a simulated vehicle.
 
 Pure functions of a pymavlink `MAVLink` (see `framing.coder`), returning the message to pack or send. Inside, all is
-NED, FRD, SI, radians, Hamilton quaternions; the messages' units and frames are made here. What an autopilot tells is
+NED, FRD, SI, radians, Hamilton quaternions; the messages' units and frames are made here. An autopilot's values are
 rounded to the message's resolution; values beyond a field's range are held at its limit.
 """
 
@@ -20,7 +20,7 @@ NAN = float("nan")
 ESTIMATOR_VIO = 3  # MAV_ESTIMATOR_TYPE
 UPPER = np.triu_indices(6)
 HELICOPTER, ONBOARD_CONTROLLER, GENERIC_AUTOPILOT = 4, 18, 0  # MAV_TYPE, MAV_AUTOPILOT
-ODOMETRY_COMPONENT = 197  # MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY, which flownav speaks as
+ODOMETRY_COMPONENT = 197  # MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY, the component that flownav sends as
 ARMED, ACTIVE, STANDBY = 128, 4, 3  # MAV_MODE_FLAG, MAV_STATE
 MAVLINK_VERSION = 3
 FIX_3D = 3
@@ -29,7 +29,7 @@ WRAP_MS = 2**32
 
 
 class Estimate(NamedTuple):
-    """What is sent of a filter's state.
+    """The part of a filter's state that is sent.
 
     time_us: microseconds on the clock agreed with the autopilot (its boot time by TIMESYNC, or UNIX). Position and
     velocity in NED [m, m/s], attitude body FRD to earth NED, body rates [rad/s] (NaN where unknown).
@@ -115,7 +115,7 @@ def landing_target(
 
     tan_forward, tan_right: tangents of the angles from body down; distance along the line of sight [m], NaN where
     unknown: then it is sent as 0 and the position as not valid. angle_x is to the right, angle_y backwards.
-    pad_ned_m: the pad's place about the autopilot's origin, told in LOCAL_NED in place of the one in BODY_FRD.
+    pad_ned_m: the pad's place about the autopilot's origin, sent in LOCAL_NED in place of the one in BODY_FRD.
 
     Trap. ArduPilot takes BODY_FRD and no other frame, PX4 LOCAL_NED and no other: it refuses a valid position in
     BODY_FRD with `landing target: unsupported coordinate frame` (mavlink_receiver.cpp, handle_message_landing_target).
@@ -155,7 +155,7 @@ def _in_body(covariance: Array | None, body_to_earth: Array) -> Array | None:
     return np.asarray(turn @ covariance @ turn.T)
 
 
-# -- what an autopilot tells --------------------------------------------------------------------------------
+# -- an autopilot's messages -------------------------------------------------------------------------------------
 def heartbeat(mav: Any, *, armed: bool, autopilot: int = GENERIC_AUTOPILOT) -> Message:
     """HEARTBEAT (#0) of a helicopter, once a second."""
     return mav.heartbeat_encode(

@@ -24,7 +24,7 @@ def gps_raw_int(message: Message, t_s: float, context: Context) -> Iterator[Outc
 
     Traps. Before the first fix all is 0. `vel` and `cog` of 65535 are unknown; there is no vertical velocity.
     `h_acc`, `v_acc`, `vel_acc` [mm, mm/s] are extension fields, 0 where absent; `eph`, `epv` are dilutions of
-    precision times 100 (65535 unknown), which say how the receiver's range error spreads, so 2.1 m of it is taken.
+    precision times 100 (65535 unknown), which are factors on the receiver's range error, so 2.1 m of it is taken.
     `yaw` (of two antennas, 0.01 deg): 0 is not available, 65535 not measured now, north is 36000.
     Position needs the context's origin.
     """
@@ -149,7 +149,7 @@ def _accuracy_m(accuracy_mm: int, dilution: int) -> float:
 
 
 def _square(sigma: float) -> float:
-    """A variance; NaN where the sigma is 0, which is to say unstated."""
+    """A variance; NaN where the sigma is 0, which means unstated."""
     return sigma * sigma if sigma else NAN
 
 

@@ -1,4 +1,4 @@
-"""What MAVLink tells of a vehicle besides its sensors: mode, messages, parameters and what was set in flight.
+"""A vehicle's messages besides its sensors: mode, texts, parameters and their changes in flight.
 
 Traps. PX4 sends a 32-bit integer parameter as the bits of a float (the "byte-wise" encoding of the parameter protocol),
 ArduPilot sends its value. A STATUSTEXT longer than 50 characters comes in pieces with one id.
@@ -20,7 +20,7 @@ PX4_AUTO, PX4_SUB = 4, {2: "Takeoff", 3: "Hold", 4: "Mission", 5: "Return", 6: "
 
 
 class Said:
-    """What one autopilot told so far. parameters: as last told, by name."""
+    """The reports of one autopilot so far. parameters: as last received, by name."""
 
     def __init__(self, make: int) -> None:
         self.parameters: dict[str, float] = {}
@@ -30,7 +30,7 @@ class Said:
         self._set: list[Happened] = []
 
     def take(self, t_s: float, message: Message) -> None:
-        """A HEARTBEAT, STATUSTEXT or PARAM_VALUE at its log time [s], NaN before a clock was heard."""
+        """A HEARTBEAT, STATUSTEXT or PARAM_VALUE at its log time [s], NaN before a clock was received."""
         t_s = t_s if math.isfinite(t_s) else 0.0
         if message.msgname == "HEARTBEAT" and message.base_mode & CUSTOM_MODE:
             self._modes.append((t_s, int(message.custom_mode)))
@@ -49,7 +49,7 @@ class Said:
         self._messages.append((t_s, text))
 
     def happened(self) -> tuple[Happened, ...]:
-        """Everything told, in order of time."""
+        """All reports, in order of time."""
         times, numbers = np.array([t for t, _ in self._modes]), np.array([float(mode) for _, mode in self._modes])
         modes = changes(MODE, times, numbers, lambda number: mode_name(number, self._make))
         return in_time([*modes, *self._set, *messages(self._messages)])

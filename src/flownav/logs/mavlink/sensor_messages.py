@@ -48,7 +48,7 @@ def optical_flow_rad(message: Message, t_s: float, context: Context) -> Iterator
     """OPTICAL_FLOW_RAD (#106): angles [rad] summed over integration_time_us, quality 0..255, distance [m].
 
     Traps. Angles, not rates: divided by the integration time, which may be 0 without data. The gyro's angles are
-    NaN where the sensor has no gyro. A negative distance is unknown; 0 is what a rangefinder that sees nothing says.
+    NaN where the sensor has no gyro. A negative distance is unknown; 0 is the output of a rangefinder without an echo.
     A reading describes the middle of its integration.
     """
     interval_s = message.integration_time_us * 1e-6
@@ -65,8 +65,8 @@ def optical_flow_rad(message: Message, t_s: float, context: Context) -> Iterator
 def distance_sensor(message: Message, t_s: float, context: Context) -> Iterator[Outcome]:
     """DISTANCE_SENSOR (#132): cm, limits in cm, variance in cm^2, signal quality in percent.
 
-    Traps. Only orientation 25 looks down. A reading outside the sensor's own limits is none (ArduPilot says 0 when
-    it sees nothing); limits of 0 and 0 are not stated. Variance: 255 is unknown, 0 unset. signal_quality: 0 is
+    Traps. Only orientation 25 looks down. A reading outside the sensor's own limits is none (ArduPilot sends 0
+    without an echo); limits of 0 and 0 are not stated. Variance: 255 is unknown, 0 unset. signal_quality: 0 is
     unknown, 1 invalid, 100 best.
     """
     if message.orientation != DOWN:

@@ -1,4 +1,4 @@
-"""MAVLink 2 signing: who holds the 32-byte key may speak; nothing else is listened to.
+"""MAVLink 2 signing: only frames signed with the 32-byte key are accepted.
 
 A signature is the first 6 bytes of SHA-256 over the key, the frame and a time stamp: 48 bits of 10 microseconds
 since 1 January 2015. A stream (link, system, component) must always move on in time, or an old packet could be
@@ -27,7 +27,7 @@ from flownav.logs.mavlink import framing
 KEY_BYTES = 32
 EPOCH_UNIX_S = 1_420_070_400  # 2015-01-01 UTC
 TICKS_PER_S = 100_000
-NEW_STREAM_TICKS = 60 * TICKS_PER_S  # a stream not heard before may be this much behind the newest
+NEW_STREAM_TICKS = 60 * TICKS_PER_S  # a stream not received before may be this much behind the newest
 MOST_KEY_FILE_BYTES = 1024
 READ_BY_OTHERS = stat.S_IRGRP | stat.S_IROTH
 
@@ -59,7 +59,7 @@ def load_key(path: Path) -> bytes:
 
 
 def _warn_of_readers(path: Path, mode: int) -> None:
-    """Who holds the key commands the vehicle; Windows tells nothing of that in the mode."""
+    """Warn of a key that other users can read: it commands the vehicle. Windows does not show this in the mode."""
     if os.name == "posix" and mode & READ_BY_OTHERS and path not in _told:
         _told.add(path)
         print(f"flownav: {path}: other users can read this signing key; chmod 600 keeps it yours", file=sys.stderr)
@@ -87,7 +87,7 @@ def sign_outgoing(mav: Any, key: bytes, unix_s: float, *, link_id: int = 0) -> N
 class SignatureCheck:
     """The strict policy for what arrives: signed with the key, and newer than all of its stream before.
 
-    A stream that was not heard before may be a minute behind what is newest: the time now, or the newest stamp heard
+    A stream that was not received before may be a minute behind the newest time: now, or the newest stamp received
     (MAVLink 2 message signing, "Timestamp Handling"). So a fresh session takes nothing that was recorded earlier.
     clock: seconds that pass, from `unix_s` on. rejected counts by reason: `unsigned`, `bad_signature`, `replayed`. A
     forged packet changes nothing but a count.

@@ -1,4 +1,4 @@
-"""What a bag holds, whatever file it lies in; bags of SQLite (.db3) and of ROS 1 (.bag); messages as objects.
+"""The content of a bag, whatever its file format; bags of SQLite (.db3) and of ROS 1 (.bag); messages as objects.
 
 rosbag2_storage_sqlite3 has the tables of a .db3: https://github.com/ros2/rosbag2, rosbag2_storage_sqlite3/README.md.
 The library rosbags reads a .bag, and makes objects of bytes from the definitions that the bag itself holds.
@@ -24,7 +24,7 @@ LONGEST_DEFINITION = 64 << 10
 
 
 class Channel(NamedTuple):
-    """What one topic's messages are.
+    """The type of one topic's messages.
 
     kind: the type, "sensor_msgs/msg/Imu". encoding: of the messages, "cdr", "ros1" or "json". definition: of the type
     in ROS's own words, empty where the bag has none; definition_kind: "ros2msg", "ros2idl", "ros1msg", "jsonschema".
@@ -38,7 +38,7 @@ class Channel(NamedTuple):
 
 
 def one_line(said: object) -> str:
-    """What a library or a bag says, as a message shows it: names in a bag may hold anything."""
+    """Any text of a library or a bag as one line for a message: names in a bag may hold anything."""
     return " ".join(str(said).split())
 
 
@@ -56,7 +56,7 @@ class Message(NamedTuple):
 
 @dataclass
 class Bag:
-    """What walking through a bag finds: what channels there are, notes on damage, files attached to it."""
+    """The result of reading a bag: its channels, notes on damage, files attached to it."""
 
     channels: set[Channel] = field(default_factory=set)
     notes: list[str] = field(default_factory=list)
@@ -95,7 +95,7 @@ def sqlite_messages(path: Path, bag: Bag, wanted: Wanted) -> Iterator[Message]:
 
 
 def _limit(base: sqlite3.Connection, size: int) -> None:
-    """Hold SQLite to what a file of so many bytes can hold, in which nothing is packed: a value's length, its steps."""
+    """Limit SQLite to the content that an unpacked file of `size` bytes can hold: a value's length, its steps."""
     base.text_factory = lambda text: text.decode(errors="replace")
     base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(size + (1 << 20), LARGEST_CHUNK))
     every, left = 1000, [STEPS + STEPS_A_BYTE * size]
@@ -118,7 +118,7 @@ def _require_tables(path: Path, base: sqlite3.Connection) -> None:
 
 
 def _rows(base: sqlite3.Connection, query: str, size: int, values: Sequence[int] = ()) -> Iterator[tuple[Any, ...]]:
-    """Rows as long as a file of so many bytes can hold them: pages of a damaged one may lead to each other."""
+    """Yield rows as long as a file of `size` bytes can hold them: pages of a damaged one may lead to each other."""
     left = size
     try:
         for row in base.execute(query, values):
@@ -205,7 +205,7 @@ def _ros1_reader(path: Path) -> Any:
 
 
 class _Unpacking:
-    """Unpacks the chunks of a bag of so many bytes, as far as they may grow, each and together."""
+    """Unpacks the chunks of a bag of `size` bytes, as far as they may grow, each and together."""
 
     def __init__(self, size: int) -> None:
         self.left = LARGEST_CHUNK + LARGEST_RATIO * size

@@ -31,11 +31,11 @@ LARGEST_ATTACHMENT, LARGEST_DEFINITION, MOST_CHANNELS = 16 << 20, 1 << 20, 65536
 
 
 class Damage(Exception):
-    """A record that cannot be what it says."""
+    """A record that contradicts its own header."""
 
 
 class _Walk:
-    """What is known so far: schemas and channels by number."""
+    """The schemas and channels read so far, by number."""
 
     def __init__(self, bag: Bag, wanted: Wanted) -> None:
         self.bag, self.wanted = bag, wanted
@@ -96,7 +96,7 @@ class _Walk:
 
 
 def mcap_messages(path: Path, bag: Bag, wanted: Wanted) -> Iterator[Message]:
-    """The wanted messages of an MCAP file; damage is said in the bag's notes. InputError where it cannot be read."""
+    """The wanted messages of an MCAP file; damage is stated in the bag's notes. InputError where it cannot be read."""
     walk = _Walk(bag, wanted)
     try:
         with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:

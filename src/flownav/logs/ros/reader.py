@@ -1,4 +1,4 @@
-"""A bag as a Log: which messages are read, on one clock, and what is said of the choice. docs/reference/ros.md.
+"""A bag as a Log: which messages are read, on one clock, and the notes on the choice. docs/reference/ros.md.
 
 px4_msgs (https://github.com/PX4/px4_msgs) become the topics of a ULog: the same fields under the same names, so the
 same converters make streams of them. A topic's name is that of uORB behind /fmu/out/ (`uxrce_dds_client`), with the
@@ -165,7 +165,7 @@ def _ros_log(
     )
     asked_for, battery = roles.get("setpoint"), roles.get("battery")
     if "range" in roles:
-        choice.append(f"range {roles['range'].topic} is taken to look down: its message does not say where it looks")
+        choice.append(f"range {roles['range'].topic} is taken to look down: its message does not state a direction")
     return Log(
         path, streams, origin, truth, inputs, (*notes, *choice, *clock_notes, *strays),
         own, roles["autopilot"].topic if own is not None else "", standard.limits_of(roles),

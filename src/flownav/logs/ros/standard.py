@@ -27,7 +27,7 @@ def streams_of(roles: dict[str, Gathered], clock: Clock) -> tuple[list[Stream], 
 
 
 def _imu(roles: dict[str, Gathered], clock: Clock) -> list[Stream | None]:
-    """Rates and specific force; the orientation as an attitude, where the message says that it has one."""
+    """Rates and specific force; the orientation as an attitude, where the message has one."""
     topic = roles.get("imu")
     if topic is None:
         return []
@@ -107,7 +107,7 @@ def _gps(roles: dict[str, Gathered], clock: Clock) -> tuple[list[Stream], Origin
 
 
 def _nearest(topic: Gathered, clock: Clock, t_s: Array) -> Array:
-    """The velocity (NED) told nearest to each fix, NaN where none is within half the usual step."""
+    """The velocity (NED) nearest in time to each fix, NaN where none is within half the usual step."""
     told_s = clock.times(topic)
     order = np.argsort(told_s, kind="stable")
     told_s, velocity = told_s[order], ned(topic.column("vx", "vy", "vz"))[order]
@@ -120,7 +120,7 @@ def _nearest(topic: Gathered, clock: Clock, t_s: Array) -> Array:
 
 
 def limits_of(roles: dict[str, Gathered]) -> dict[str, tuple[float, float]]:
-    """What the rangefinder says of itself."""
+    """The range limits that the rangefinder states of itself [m]."""
     if "range" not in roles:
         return {}
     low, high = np.median(roles["range"].column("min_range", "max_range"), axis=0).tolist()
@@ -130,7 +130,8 @@ def limits_of(roles: dict[str, Gathered]) -> dict[str, tuple[float, float]]:
 def asked_table(topic: Gathered, t_s: Array) -> Table:
     """Positions that the autopilot was to hold, as its local frame has them; a component that was left open is NaN.
 
-    mavros_msgs/PositionTarget: ENU, since mavros turns MAVLink's (setpoint_raw.cpp); a bit of `type_mask` says: ignore.
+    mavros_msgs/PositionTarget: ENU, since mavros turns MAVLink's (setpoint_raw.cpp); a bit of `type_mask` means:
+    ignore.
     """
     place = topic.column("x", "y", "z")
     if topic.kind == TARGET:
@@ -153,7 +154,7 @@ def battery_table(topic: Gathered, t_s: Array) -> Table | None:
 
 
 def path_table(topic: Gathered, t_s: Array) -> Table | None:
-    """Positions, and where they are told attitude and body velocity, in NED and FRD; None without two rows.
+    """Positions, and attitude and body velocity where they are given, in NED and FRD; None without two rows.
 
     Odometry's velocity is in its child frame, the body (nav_msgs/Odometry).
     """

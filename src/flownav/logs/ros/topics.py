@@ -68,7 +68,7 @@ VALUES_READ: dict[str, Values] = {kind: attrgetter(*columns.values()) for kind, 
 
 @dataclass
 class Gathered:
-    """One topic's messages: when each was logged and what its header says [ns], and its numbers."""
+    """One topic's messages: when each was logged and its header's stamp [ns], and its numbers."""
 
     topic: str
     kind: str
@@ -114,7 +114,7 @@ def stamp_of(message: Any) -> int:
 
 
 def values_of(kind: str, message: Any) -> tuple[float, ...]:
-    """What is kept of a message, in the order of NAMES[kind]; of covariances what says that there are none."""
+    """The values kept of a message, in the order of NAMES[kind]; of covariances the mark that there are none."""
     values = VALUES_READ[kind](message)
     if kind == "sensor_msgs/msg/Imu":
         values = (*values[:10], *(covariance[0] == -1.0 for covariance in values[10:]))
@@ -125,8 +125,9 @@ def values_of(kind: str, message: Any) -> tuple[float, ...]:
 
 # -- which topic serves -------------------------------------------------------------------------------------
 class Role(NamedTuple):
-    """What a topic may serve as. kinds: types that can; likely, unlikely: words in its name that speak for it, or
-    that rule it out unless it is asked for; named: only topics with a likely word."""
+    """A role that a topic may serve in. kinds: types that can; likely, unlikely: words in its name that suggest it,
+    or that rule it out unless it is asked for; named: only topics with a likely word.
+    """
 
     name: str
     kinds: tuple[str, ...]

@@ -1,1 +1,3 @@
-"""Filters that were not made here, or are made to be read: how one's own stands in flownav, scored beside ours."""
+"""Filters from other libraries, or written to be read: how a user's own filter fits into flownav, scored next to
+ours.
+"""

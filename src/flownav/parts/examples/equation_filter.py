@@ -18,7 +18,7 @@ LONGEST_S = 0.1  # a gap in the inertial readings is no longer than this
 
 
 class Memory(NamedTuple):
-    """The state, and when each sensor was heard last [s]. known: 1 with a fix, grounded: with a range."""
+    """The state, and the time of each sensor's last reading [s]. known: 1 with a fix, grounded: with a range."""
 
     pos_n: float = 0.0
     pos_e: float = 0.0
@@ -81,7 +81,7 @@ def by_imu(m: Memory, t_s: float, r: Reading) -> Memory:
 
 @equation
 def share_of(since_s: float, t_s: float, time_s: float) -> float:
-    """How much of what a sensor says is believed, by the time since it spoke last."""
+    """The weight of a sensor's reading, by the time since its last one."""
     return min((t_s - since_s) / time_s, 1.0)
 
 
@@ -98,7 +98,7 @@ def by_gps(m: Memory, t_s: float, r: Reading) -> Memory:
 
 @equation
 def by_gps_velocity(m: Memory, t_s: float, r: Reading) -> Memory:
-    """Velocity, where no flow tells it."""
+    """Correct the velocity by GPS, where there is no flow."""
     k = share_of(m.velocity_s, t_s, VELOCITY_S) if t_s - m.flow_s > 1.0 else 0.0
     off_d = r.value_2 - m.vel_d if np.isfinite(r.value_2) else 0.0
     return with_velocity(

@@ -113,7 +113,7 @@ class StoneSoupKalman:
 
 
 def _stone_soup() -> SimpleNamespace:
-    """What is used of it."""
+    """The parts of Stone Soup that are used."""
     try:
         from stonesoup.models.control.linear import LinearControlModel
         from stonesoup.models.measurement.linear import LinearGaussian

@@ -1,4 +1,4 @@
-"""What a campaign costs beside its flights: the store, going on, a cluster on one node, memory."""
+"""The cost of a campaign besides its flights: the store, going on, a cluster on one node, memory."""
 
 import json
 import shutil
@@ -19,7 +19,7 @@ from flownav.studies.benchmark import Figure
 
 ROUNDS = 3
 MEMORY_FLIGHTS = (1024, 10_000)
-NAVIGATORS_SHARE = 4  # its campaign is so many times smaller
+NAVIGATORS_SHARE = 4  # its campaign is smaller by this factor
 
 
 def campaigns(flights: int) -> list[Figure]:

@@ -19,7 +19,7 @@ from flownav.studies.benchmark import REPEATS, Figure, best_of
 from flownav.studies.benchmark.campaigns import campaigns
 
 PART_STEPS, PART_ROUNDS = 1000, 50
-NAVIGATORS_SHARE = 4  # the navigator's batch is so many times smaller
+NAVIGATORS_SHARE = 4  # the navigator's batch is smaller by this factor
 
 
 def measure_all(flights: int) -> Iterator[list[Figure]]:

@@ -1,4 +1,4 @@
-"""What a block of flights spends on its plant, on the navigator and on the rest, of each kind of vehicle.
+"""The time that a block of flights spends on its plant, on the navigator and on the rest, for each kind of vehicle.
 
 Then the recorded flight that replays are timed on, and steps of the filters and their parts, each in a bare loop.
 """
@@ -50,7 +50,7 @@ class Parts(NamedTuple):
 
     @property
     def rest_s(self) -> float:
-        """What is neither plant nor navigator."""
+        """The time that is neither the plant's nor the navigator's [s]."""
         return self.whole_s - self.plant_s - self.navigator_s
 
 
@@ -87,7 +87,7 @@ def take_nothing(
     work: Work, p: Work, estimate: Work, innovation: Work, event: Work, entry: Work, state: Work, covariance: Work,
     room: NDArray[np.int64], used: NDArray[np.int64], t_s: float, sensor: int, lanes: Lanes,
 ) -> None:  # fmt: skip
-    """In place of `navigation.take.take_one`: a reading is heard by nobody."""
+    """Stands in place of `navigation.take.take_one`: the reading is ignored and only its time is kept."""
     work[len(lanes) - 1] = t_s
 
 

@@ -70,7 +70,7 @@ def rows_of(name: str, log: Log, entrants: Sequence[Entrant], gps_delay_s: float
 
 
 def _figures(entrants: Sequence[Entrant], reference: Reference | None, airborne: Window | None) -> list[Row]:
-    """What is the same for all kinds of estimator."""
+    """The figures that all kinds of estimator have."""
     nothing = {"horizontal_rms_m": None, "velocity_rms_m_s": None, "samples": 0}
     if reference is None:
         return [{"against": None, **nothing, "airborne": None} for _ in entrants]

@@ -20,9 +20,9 @@ MEASURES = ("horizontal_m", "vertical_m", "velocity_m_s")
 def rows_of_records(named: Sequence[tuple[str, Record]]) -> list[Row]:
     """A row for each record in the order given; the differences are those from the first.
 
-    Errors are lengths of the error of what was flown on, or else of the estimate, against the record's truth, or else
-    (position alone) against GPS, in flight alone. rms: over the flight; difference: the mean of a record's error less
-    the first one's at the same time of flight, over the stretch that both have.
+    Errors are lengths of the error of the estimate used by the autopilot, or else of the navigator's, against the
+    record's truth, or else (position alone) against GPS, in flight alone. rms: over the flight; difference: the mean of
+    a record's error less the first one's at the same time of flight, over the stretch that both have.
     """
     series = [in_flight(record, errors_in_time(record)) for _, record in named]
     return [
@@ -40,7 +40,7 @@ def rows_of_records(named: Sequence[tuple[str, Record]]) -> list[Row]:
 
 
 def against(record: Record) -> str | None:
-    """What a record's errors are taken against: "truth", what else serves for one, "gps", or None."""
+    """The reference of a record's errors: "truth", the name of another reference, "gps", or None."""
     if len(record.tables.get("truth", {}).get("t_s", ())):
         stated = str(record.manifest.get("truth_name") or "truth")
         return "truth" if stated in ("truth.csv", "the simulator") else stated

@@ -1,6 +1,6 @@
-"""What an estimator said, whatever it is, and one measure for all: the same reference, instants and way laid on it.
+"""The track of any estimator, and one measure for all: the same reference, instants and way of alignment.
 
-No filter, no model of an error, nothing learnt. Whoever does worse has thrown information away.
+No filter, no model of an error, nothing learnt. An estimator that does worse has thrown information away.
 """
 
 from collections.abc import Sequence
@@ -69,7 +69,7 @@ Window = tuple[float, float]
 
 
 class Reference(NamedTuple):
-    """What estimates are held against: "truth", whose frame may be turned, or "gps", with its delay taken off.
+    """The reference of the estimates: "truth", whose frame may be turned, or "gps", with its delay taken off.
 
     position (n, 3) and velocity (m, 2) north, east, down, each at its own instants.
     """

@@ -67,7 +67,7 @@ class Aloft:
 
     @cached_property
     def told(self) -> Told:
-        """What the autopilot was told."""
+        """The autopilot's settings, as read from its parameters."""
         return told(self.log.parameters)
 
     @cached_property
@@ -152,7 +152,7 @@ class Aloft:
 
     @cached_property
     def ground_range_m(self) -> float:
-        """What the range reads on the ground; 0 where the log begins in flight."""
+        """The range reading on the ground [m]; 0 where the log begins in flight."""
         if self.ranges is None:
             return 0.0
         first = float(np.median(self.ranges[1][:START_ROWS]))

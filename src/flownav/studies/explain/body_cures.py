@@ -1,4 +1,4 @@
-"""What cures a vehicle that shakes, an inertial unit that lies and a landing taken for flight."""
+"""Cures of a vehicle that shakes, an inertial unit that reads wrong, and a landing detected in flight."""
 
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.cure import Cure, decimal, either, whole
@@ -32,7 +32,7 @@ def other_imu(case: Case, sign: Sign, dialect: str) -> Cure:
 
 
 def landing(case: Case, sign: Sign, dialect: str) -> Cure:
-    """What the landing detector goes by."""
+    """Cure of the landing detector's thresholds."""
     px4 = (
         whole("MPC_USE_HTE", 1.0, "the hover thrust is found in flight"),
         decimal("LNDMC_Z_VEL_MAX", 0.15, "m/s: slower than any descent"),

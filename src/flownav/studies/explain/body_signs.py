@@ -65,7 +65,7 @@ def vibration(case: Case) -> Found:
 
 
 def _clips(railed: float, counted: float) -> str:
-    """What is said of clipping, where there is any."""
+    """The words about clipping; "" where there is none."""
     said = [f"in {100.0 * railed:.1f} % of its readings"] if railed >= 5e-4 else []
     said += [f"{counted:.0f} times by the vehicle's count"] if counted > 0.0 else []
     return f", and clips: {' and '.join(said)}" if said else ""
@@ -89,7 +89,7 @@ def lying(case: Case) -> Found:
     drag = _drag(case, t_s, mean[:, :2], aloft, count)
     level = np.hypot(*(mean[:, :2] - drag).T)
     most_drag = float(np.quantile(np.hypot(*(drag[aloft] - np.median(drag[aloft], axis=0)).T), 0.99))
-    chance = CHANCE * _shaking(value[aloft, 3:]) / count**0.5  # of a mean of so many shaken readings
+    chance = CHANCE * _shaking(value[aloft, 3:]) / count**0.5  # of a mean of `count` shaken readings
     usual = max(
         LYING_LEVEL_M_S2 + chance, USUAL_SPREADS * float(np.quantile(level[aloft], 0.5)), DRAG_UNKNOWN * most_drag
     )
@@ -146,7 +146,9 @@ def _drag(case: Case, t_s: Array, level: Array, aloft: Flags, count: int) -> Arr
 
 
 def _body_speed(case: Case, t_s: Array, count: int) -> Array | None:
-    """Speed along body x and y (n, 2), averaged as the force is: by GPS, where it is heard, else by flow, else NaN."""
+    """Speed along body x and y (n, 2), averaged as the force is: by GPS where a reading is near, else by flow, else
+    NaN.
+    """
     body = np.full((len(t_s), 2), np.nan)
     for found in (case.flow_velocity, _gps_in_body(case)):
         if found is not None:
@@ -212,7 +214,7 @@ def gap(case: Case) -> Found:
 
 
 def _others_go_on(case: Case, begin: float, end: float) -> bool:
-    """Whether most fast sensors were heard meanwhile: else the log has a hole, and says nothing."""
+    """Whether most fast sensors sent readings meanwhile: else the log has a hole, and shows nothing."""
     fast = [
         s
         for sensor, s in case.log.streams.items()
@@ -225,13 +227,13 @@ def _others_go_on(case: Case, begin: float, end: float) -> bool:
 
 
 def landed(case: Case) -> Found:
-    """Said to have landed while it is in the air."""
+    """Finds a landed state that is reported while the vehicle is in the air."""
     flag = case.stream(Sensor.LANDED)
     if flag is None:
-        return Lack("nothing says when it had landed")
+        return Lack("nothing reports when it had landed")
     flying = flag.t_s[flag.value[:, 0] < 0.5]
     if not len(flying):
-        return Lack("the flag never says that it flies")
+        return Lack("the flag never reports flight")
     grid = np.arange(max(case.flight_s[0], flying[0]), min(case.flight_s[1], flying[-1]), 0.05)
     if len(grid) < 20:
         return nothing(case.flight_s)
@@ -249,7 +251,7 @@ def landed(case: Case) -> Found:
     seconds = sum(float(grid[b] - grid[a]) for a, b in long)
     window: Window = (float(grid[long[0][0]]), float(grid[long[-1][1]])) if long else case.flight_s
     picture = Picture(
-        "height (m), and 1 where it is said to have landed",
+        "height (m), and 1 where the landed state is reported",
         (
             Trace(
                 "truth",
@@ -257,7 +259,7 @@ def landed(case: Case) -> Found:
                 grid,
                 np.interp(grid, *case.range_height) if case.range_height else np.zeros(len(grid)),
             ),
-            Trace("flow", "said to have landed", grid, said.astype(float)),
+            Trace("flow", "reported as landed", grid, said.astype(float)),
         ),
     )
     return Sign(seconds / LANDED_S, window, {"seconds": seconds}, (picture,))

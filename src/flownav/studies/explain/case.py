@@ -76,7 +76,7 @@ class Case(Aloft):
 
     @cached_property
     def expected_flow(self) -> tuple[Array, Array] | None:
-        """What the flow should be by the inertial readings alone, its quick part (n, 2): turning and translation."""
+        """The flow that the inertial readings alone predict, its quick part (n, 2): turning and translation."""
         if self.rates is None or self.flow is None:
             return None
         t_s, _ = self.rates
@@ -134,7 +134,9 @@ class Case(Aloft):
 
     @cached_property
     def _shaken_flow(self) -> float:
-        """What the accelerometer's white noise, integrated and high-passed, adds to the expected flow [(rad/s)^2]."""
+        """The variance that the accelerometer's white noise, integrated and high-passed, adds to the expected flow
+        [(rad/s)^2].
+        """
         imu = self.stream(Sensor.IMU)
         if imu is None or self.ranges is None or self.inertial_velocity is None:
             return 0.0
@@ -229,11 +231,11 @@ class Case(Aloft):
 
     # -- the autopilot -------------------------------------------------------------------------------------------
     def told_of(self, kind: str) -> list[tuple[float, float]]:
-        """When and what the log says of one kind."""
+        """Times and values of the log's events of one kind."""
         return [(row.t_s, row.value) for row in self.log.happened if row.kind == kind]
 
     def source_set_at(self, t_s: Array) -> Array:
-        """The number of EKF3's source set at instants; 1 until the log says another."""
+        """The number of EKF3's source set at instants; 1 until the log reports another."""
         switched = self.told_of(SOURCE_SET)
         times = np.array([-np.inf, *(t for t, _ in switched)])
         numbers = np.array([1.0, *(value for _, value in switched)])
@@ -241,7 +243,9 @@ class Case(Aloft):
 
     @cached_property
     def fused_share(self) -> float | None:
-        """The share of the flight in which the autopilot's filter took the flow; None where nobody says."""
+        """The share of the flight in which the autopilot's filter took the flow; None where the log does not report
+        it.
+        """
         said = self.told_of(FUSES_FLOW)
         if not said:
             return None
@@ -252,13 +256,15 @@ class Case(Aloft):
 
     @cached_property
     def clipped(self) -> float | None:
-        """How many accelerometer samples the vehicle counted as clipped until it landed; None where it says nothing."""
+        """How many accelerometer samples the vehicle counted as clipped until it landed; None where it reports none."""
         said = [(t, value) for t, value in self.told_of(CLIPPING) if t <= self.flight_s[1]]
         return said[-1][1] - said[0][1] if said else None
 
     @cached_property
     def shaken_m_s2(self) -> float:
-        """The level of vibration that the vehicle told for two seconds of its flight; 0 where it tells none."""
+        """The level of vibration that the vehicle reported over at least two seconds of its flight; 0 where it reports
+        none.
+        """
         told = [(t, v) for t, v in self.told_of(VIBRATION) if t <= self.flight_s[1]]
         ends = [t for t, _ in told[1:]] + [self.flight_s[1]]
         held = [v for (t, v), end in zip(told, ends, strict=False) if end - max(t, self.flight_s[0]) >= SHAKEN_S]
@@ -267,7 +273,7 @@ class Case(Aloft):
     # -- the second navigator ------------------------------------------------------------------------------------
     @cached_property
     def options(self) -> ReplayOptions:
-        """How the log is replayed: with the GPS delay that the autopilot was told, where it was told one."""
+        """The options of the log's replay: with the GPS delay of the autopilot's parameters, where they state one."""
         delay = self.told.gps_delay_s
         return ReplayOptions() if delay is None or not 0.0 < delay <= 1.0 else ReplayOptions(gps_delay_s=delay)
 

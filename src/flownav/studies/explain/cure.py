@@ -1,7 +1,7 @@
-"""What cures a cause: parameters of the log's own autopilot, each with its reason, and what to do by hand.
+"""The cure of a cause: parameters of the log's own autopilot, each with its reason, and what to do by hand.
 
-A parameter is computed from what the log has and from what the sign found. Where no parameter can cure a cause, none is
-made up: the words say what to do.
+A parameter is computed from the log's content and the sign's figures. Where no parameter can cure a cause, none is
+made up: the text states what to do.
 """
 
 from collections.abc import Callable
@@ -53,7 +53,7 @@ def by_hand_only(words: str) -> Curing:
 
 
 def number(sign: Sign, name: str) -> float:
-    """What a sign found."""
+    """A figure of a sign."""
     return float(sign.figures[name])
 
 

@@ -1,4 +1,4 @@
-"""What cures a wrong setting of the flow sensor, or a picture that it cannot read."""
+"""Cures of a wrong setting of the flow sensor, or of a picture that it cannot read."""
 
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.cure import Cure, Settings, decimal, either, number, whole
@@ -16,7 +16,7 @@ def axes(case: Case, sign: Sign, dialect: str) -> Cure:
         return Cure((), "No rotation mends a mirrored sensor: mend the driver's signs, or its firmware.", holds=False)
     turn = (case.told.flow_turn_deg or 0.0) - number(sign, "turn_deg")
     eighths = round(turn / EIGHTH_DEG) % 8
-    reason = f"the flow is turned by {-number(sign, 'turn_deg'):.0f} degrees beside what is set"
+    reason = f"the flow is turned by {-number(sign, 'turn_deg'):.0f} degrees from the set rotation"
     near = abs((turn - eighths * EIGHTH_DEG + 180.0) % 360.0 - 180.0) <= NEAR_EIGHTH_DEG
     px4 = (whole("SENS_FLOW_ROT", float(eighths), reason),) if near else ()
     degrees = eighths * EIGHTH_DEG if near else turn % 360.0
@@ -43,7 +43,7 @@ def scale(case: Case, sign: Sign, dialect: str) -> Cure:
 
 
 def delay(case: Case, sign: Sign, dialect: str) -> Cure:
-    """The delay that the filter is told."""
+    """The flow delay to set in the autopilot's filter."""
     lag = number(sign, "lag_ms")
     reason = f"a reading is {lag:.0f} ms old when it arrives"
     return either(
@@ -61,7 +61,7 @@ def delay(case: Case, sign: Sign, dialect: str) -> Cure:
 
 
 def texture(case: Case, sign: Sign, dialect: str) -> Cure:
-    """Keep out what the sensor itself says is poor, and trust the rest less."""
+    """Reject flow that the sensor itself rates as poor, and trust the rest less."""
     quality = number(sign, "quality")
     least = min(max(quality + 20.0, 30.0), 150.0)
     told = case.told.least_quality or 0.0

@@ -1,7 +1,7 @@
 """Signs of the flow sensor's settings: its axes, scale, delay, clock and gyro.
 
 Two witnesses that no reference is needed for: flow turns as the vehicle turns, at once and by the same angle, and its
-quick part is that of the accelerometer's integral over the range. Where GPS tells a velocity, that is a third.
+quick part is that of the accelerometer's integral over the range. Where GPS gives a velocity, that is a third.
 """
 
 import itertools
@@ -36,7 +36,9 @@ def _significance(fit: Fit | None, of: int = 1) -> float:
 
 # -- axes ----------------------------------------------------------------------------------------------------------
 def turned(case: Case) -> tuple[float, bool, float]:
-    """The flow's turn [rad], whether it mirrors, and how many standard errors say so: of all witnesses the surest."""
+    """The flow's turn [rad], whether it mirrors, and its significance in standard errors: by the surest of all
+    witnesses.
+    """
     if _significance(case.flow_fit) > SIGNIFICANT and case.flow_fit is not None:
         angle, _, mirrored = turn_of(case.flow_fit.matrix)
         return angle, mirrored, _significance(case.flow_fit)
@@ -68,7 +70,7 @@ def axes(case: Case) -> Found:
 
 
 def axes_words(angle: float, mirrored: bool, matrix: Array | None) -> str:
-    """What is wrong with the axes, in words; matrix: the response (2, 2), where it is known."""
+    """The error of the axes, in words; matrix: the response (2, 2), where it is known."""
     if mirrored:
         if matrix is None:
             return "they are mirrored: one is inverted, or the two are swapped"
@@ -201,7 +203,7 @@ def found_lag(case: Case) -> float | None:
 
 
 def delay(case: Case) -> Found:
-    """Older on arrival than the autopilot was told."""
+    """Finds flow that is older on arrival than the autopilot's parameter states."""
     if case.flow is None:
         return NO_FLOW
     lag = found_lag(case)
@@ -212,7 +214,7 @@ def delay(case: Case) -> Found:
         return nothing(case.flight_s, lag_s=lag)
     late = (lag - told_s) / LATE_S if told_s is not None else lag / UNTOLD_LATE_S
     early = (told_s - lag) / (2.0 * EARLY_S) if told_s is not None else 0.0
-    was = "nothing" if told_s is None else f"{1e3 * told_s:.0f} ms"
+    was = "no value" if told_s is None else f"{1e3 * told_s:.0f} ms"
     figures: dict[str, float | str] = {"lag_ms": 1e3 * lag, "told": was}
     return Sign(max(late, early, 0.0), case.flight_s, figures, (expected_picture(case),))
 

@@ -1,4 +1,4 @@
-"""What cures a height that follows something else than the height."""
+"""Cures of a height estimate that follows another quantity than the height."""
 
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.cure import Cure, Settings, decimal, either, number, whole
@@ -25,7 +25,7 @@ def _not_by_range(case: Case, dialect: str) -> Cure:
 
 
 def reach(case: Case, sign: Sign, dialect: str) -> Cure:
-    """Stay within reach, and say truly what that is."""
+    """Stay within reach, and state the reach truly."""
     ceiling = number(sign, "ceiling_m")
     limit = round(0.9 * ceiling, 1)
     base = _not_by_range(case, dialect)
@@ -63,7 +63,7 @@ def spikes(case: Case, sign: Sign, dialect: str) -> Cure:
             whole("EK3_RNG_I_GATE", 300.0, "hundredths of a sigma: single echoes are refused"),
             decimal("EK3_RNG_M_NSE", 1.0, "m: what is left counts for less"),
         ),
-        "A sonar hears grass and propellers, a lidar dust and sunlight: move it, or fit another.",
+        "A sonar picks up grass and propellers, a lidar dust and sunlight: move it, or fit another.",
         holds=False,
     )
     return cure._replace(settings=(*cure.settings, *_not_by_range(case, dialect).settings))

@@ -14,7 +14,7 @@ NO_RANGE = Lack("no range")
 MISSING_S, NEAR_S, REACHED_SHARE, LEFT_SHARE = 3.0, 0.6, 0.8, 0.4
 STUCK_S, MOVED_M, BROKEN_S, LEAST_REPEATS = 1.5, 0.25, 0.5, 8
 FLAT_M, FLAT_STEP_S, FLAT_S = 0.06, 0.2, (3.0, 6.0, 12.0, 24.0)  # as near to one distance, for so long
-FLAT_MOVED_M, ALONE = 0.9, 1.7  # by barometer and GPS; by one of them alone so many times more
+FLAT_MOVED_M, ALONE = 0.9, 1.7  # by barometer and GPS; by one of them alone this factor more
 FLAT_QUICK_S, QUICK_MOVED_M = 4.0, 0.15  # of the accelerometer's own height
 JUMP_ROWS, JUMP_M, BY_JUMPS = 3, 0.4, (1.0, 1.6, 2.0)
 SPIKE_M, SPIKE_SHARE, SPIKES = 0.22, 0.15, 0.035
@@ -25,7 +25,7 @@ NOT_THE_HEIGHT = 0.6  # of the harm where the barometer is not what holds the he
 
 
 def reach(case: Case) -> Found:
-    """No valid range in flight, above what it has reached or was told to reach."""
+    """Finds a flight without valid range above the height that it has reached or that is set as its limit."""
     if case.ranges is None:
         return NO_RANGE
     t_s, range_m = case.ranges
@@ -50,7 +50,7 @@ def reach(case: Case) -> Found:
             Trace("truth", "range", t_s, range_m, dots=True),
             Trace("estimate", "other heights", grid, height_m),
         ),
-        "Above its reach the rangefinder says nothing.",
+        "Above its reach the rangefinder gives no reading.",
     )
     return Sign(harm * seconds / MISSING_S, window, figures, (picture,))
 
@@ -122,7 +122,7 @@ def _flat(case: Case) -> Sign | None:
 
 
 def _flattest(grid: Array, mine: Array, theirs: list[Array], count: int) -> Sign | None:
-    """Of the windows of so many rows in which the range is flat the one in which the others moved most."""
+    """Of the windows of `count` rows in which the range is flat the one in which the others moved most."""
     if len(grid) <= count:
         return None
     span = np.ptp(np.lib.stride_tricks.sliding_window_view(mine, count), axis=1)
@@ -206,8 +206,8 @@ def terrain(case: Case) -> Found:
 
 
 def _unmoved(case: Case, t_s: Array, step: Array) -> Array:
-    """What a change of the range over the two STEP_S leaves when the vehicle's own motion is taken off, of each
-    witness of that motion that one by which the least is left: a step of the ground is one to all of them.
+    """The change of the range over the two STEP_S less the vehicle's own motion, of each witness of that motion the one
+    that leaves least: a step of the ground is one to all of them.
     """
     witnesses = []
     if case.inertial_velocity is not None and case.base is not None:

@@ -20,7 +20,7 @@ from flownav.studies.explain.trials import Trial, tried
 
 STEEPNESS, MIDDLE = 6.0, 1.0  # odds = (strength / MIDDLE) ** STEEPNESS
 LIKELY, SURE, SHOWN = 0.5, 0.95, 0.02
-ASTRAY_M = 1.0  # of the autopilot's own estimate, from which on the verdict says it
+ASTRAY_M = 1.0  # of the autopilot's own estimate, from which on the verdict states it
 TRIED_FROM, MOST_TRIED = 0.3, 8
 WORSE, WORSE_FACTOR = -0.5, 0.5  # a repair that makes the innovations worse by half speaks against the cause
 STRONGEST, AS_SURE_AS_ANY = 6.0, 3.0
@@ -41,7 +41,7 @@ class Finding(NamedTuple):
 
     name, title, sentence; window_s: the seconds; probability; explained: share of the sensors' disagreement with the
     path that the repair takes away (None where nothing could be replayed, or nothing disagrees); drift_m: of the
-    autopilot's own estimate meanwhile; figures: what the sentence says, as numbers; pictures; cure.
+    autopilot's own estimate meanwhile; figures: the numbers of the sentence; pictures; cure.
     """
 
     name: str
@@ -57,8 +57,8 @@ class Finding(NamedTuple):
 
 
 class Explanation(NamedTuple):
-    """What came of a log: the causes, the first one first; every hypothesis that was looked into; and what each of
-    the others would need that the log lacks.
+    """The explanation of a log: the causes, the first one first; every hypothesis that was checked; and the data that
+    each of the others needs and the log lacks.
     """
 
     log: str
@@ -88,7 +88,7 @@ class Explanation(NamedTuple):
         """The parameter file against the causes, for the log's own autopilot or another. ValueError of no dialect."""
         chosen = dialect or self.dialect
         if not chosen:
-            raise ValueError("the log does not say whose parameters are needed: px4 or ardupilot")
+            raise ValueError("the log does not show whose parameters are needed: px4 or ardupilot")
         return text_of(chosen, [(one.sentence, one.cure) for one in self.findings])
 
 
@@ -103,7 +103,7 @@ def probability_of(strength: float) -> float:
 def explain(log: Log, *, dialect: str = "", quick: bool = False) -> Explanation:
     """Look into every hypothesis, try those that remain, and name the causes.
 
-    dialect: whose parameters the cure is for, where the log does not say. quick: nothing is tried.
+    dialect: whose parameters the cure is for, where the log does not show it. quick: nothing is tried.
     """
     case = Case(log)
     checked, missing = looked(case)
@@ -131,7 +131,7 @@ def looked(case: Case) -> tuple[list[Checked], list[tuple[str, str]]]:
 
 
 def _look(one: Hypothesis, case: Case) -> Found:
-    """The sign; a log so poor that it cannot be worked out is one that lacks something, and says so."""
+    """The sign; a log so poor that it cannot be worked out is one that lacks something, with that reason."""
     try:
         with np.errstate(all="ignore"):
             found: Found = one.look(case)
@@ -168,7 +168,7 @@ def _overlap(one: Window, other: Window) -> bool:
 
 
 def _tried(case: Case, checked: list[Checked]) -> list[Checked]:
-    """The candidates that remain, tried; a repair that makes things much worse halves what its sign says."""
+    """The candidates that remain, tried; a repair that makes things much worse halves its sign."""
     candidates = sorted(
         (one for one in checked if one.probability >= TRIED_FROM and not one.consequence_of),
         key=lambda one: -one.probability,

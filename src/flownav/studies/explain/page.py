@@ -21,7 +21,7 @@ SLACK_S = 2.0
 
 
 def facts(explained: Explanation) -> dict[str, Any]:
-    """What `flownav explain --json` prints, but for the files that it wrote."""
+    """The output of `flownav explain --json`, except the files that it wrote."""
     told: dict[str, Any] = finite(
         {
             "log": explained.log,
@@ -144,7 +144,7 @@ def _begin(explained: Explanation, span_s: Window) -> float:
 def _section(number: int, one: Finding, span_s: Window) -> Section:
     rank = "First cause" if number == 0 else "Another cause"
     panels = tuple(panel(one, place, picture, span_s) for place, picture in enumerate(one.pictures))
-    none = (Panel(f"{one.name}-none", one.title, absent="There is nothing to draw: the parameters say it."),)
+    none = (Panel(f"{one.name}-none", one.title, absent="There is nothing to draw: the parameters show it."),)
     return Section(one.name, f"{rank}: {one.title}", panels or none)
 
 
@@ -162,7 +162,7 @@ def panel(one: Finding, place: int, picture: Picture, span_s: Window) -> Panel:
 
 
 def _shown(picture: Picture, span_s: Window) -> Window:
-    """What the traces cover, within the log."""
+    """The time span that the traces cover, within the log."""
     starts = [float(trace.t_s[0]) for trace in picture.traces if len(trace.t_s)]
     ends = [float(trace.t_s[-1]) for trace in picture.traces if len(trace.t_s)]
     if not starts:

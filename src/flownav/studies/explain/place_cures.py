@@ -1,4 +1,4 @@
-"""What cures GPS, compass and the choice among sources."""
+"""Cures of GPS, of the compass and of the choice among sources."""
 
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.cure import Cure, Settings, decimal, either, number, whole
@@ -11,7 +11,7 @@ HOVER_THROTTLE = 0.4
 
 
 def lag(case: Case, sign: Sign, dialect: str) -> Cure:
-    """The delay that the filter is told of GPS."""
+    """The GPS delay to set in the autopilot's filter."""
     late = max(number(sign, "lag_ms") - 200.0, 0.0)  # of its own velocity, which every receiver smooths
     reason = f"its velocity is {number(sign, 'lag_ms'):.0f} ms behind, of which a receiver smooths 200 ms away"
     return either(
@@ -24,7 +24,7 @@ def lag(case: Case, sign: Sign, dialect: str) -> Cure:
 
 
 def glitch(case: Case, sign: Sign, dialect: str) -> Cure:
-    """Narrower gates, and flow to stand beside GPS."""
+    """Narrower gates, and flow in addition to GPS."""
     flow = case.flow is not None
     px4: Settings = (
         decimal("EKF2_GPS_P_GATE", 3.0, "sigma: jumps are refused"),
@@ -90,7 +90,7 @@ def motors(case: Case, sign: Sign, dialect: str) -> Cure:
 
 
 def never_switched(case: Case, sign: Sign, dialect: str) -> Cure:
-    """Take the flow beside GPS, so that nobody has to switch."""
+    """Use flow in addition to GPS, so that no switch is needed."""
     px4 = (whole("EKF2_OF_CTRL", 1.0, "flow is taken"),)
     place = 3.0 if case.gps_velocity is not None else 0.0
     ardupilot = (

@@ -13,7 +13,7 @@ GLITCH_M, WALK_M, UNBROKEN_S = 4.0, 9.5, 2.0  # in one step; within half a minut
 LAG_S, UNTOLD_LAG_S, USUAL_LAG_S = 0.42, 0.50, 0.22  # a receiver's own velocity lags by 0.2 s beside its delay
 TURN_RAD, SIGNIFICANT = 0.45, 4.0
 LAST_S, LEAST_ROWS = 5.0, 8  # before it lands; logs end soon after
-SETTLED_S, OFF_S, OFF_TURNS = 1.5, 4.0, 1.2  # a field that went off for so long, by so many TURN_RAD
+SETTLED_S, OFF_S, OFF_TURNS = 1.5, 4.0, 1.2  # a field that was off for this long, by this multiple of TURN_RAD
 PUSHED_SHARE, REST_S, LEAST_REST_ROWS = 0.30, 12.0, 15
 LEAST_LEVEL_GAUSS, QUIET_RAD_S, TURNED_COUNTS = 0.05, 0.1, 0.6
 
@@ -68,7 +68,7 @@ def _slow(t_s: Array, values: Array) -> Array:
 
 
 def lag(case: Case) -> Found:
-    """Fixes older than the autopilot was told."""
+    """Finds fixes that are older than the autopilot's parameter states."""
     if case.stream(Sensor.GPS_VELOCITY) is None:
         return Lack("no GPS velocity")
     tie = case.heading_tie
@@ -79,7 +79,7 @@ def lag(case: Case) -> Found:
     strength = max(over, 0.0) / (LAG_S if told_s is not None else UNTOLD_LAG_S)
     figures: dict[str, float | str] = {
         "lag_ms": 1e3 * tie.lag_s,
-        "told": "nothing" if told_s is None else f"{1e3 * told_s:.0f} ms",
+        "told": "no value" if told_s is None else f"{1e3 * told_s:.0f} ms",
     }
     if case.gps_velocity is None or case.inertial_velocity is None:
         return nothing(case.flight_s, strength)

@@ -38,7 +38,7 @@ def deadlock(case: Case) -> Found:
 
 
 def height_noise(case: Case) -> Found:
-    """The height's source is said to be so noisy that nothing holds the height."""
+    """Finds a stated noise of the height's source so large that nothing holds the height."""
     noise = case.told.height_noise_m
     if noise is None:
         return Lack("no parameter states the noise of the height's source")
@@ -158,5 +158,5 @@ def _flow_picture(case: Case) -> tuple[Picture, ...]:
         traces.append(Trace("truth", "range (m)", *case.ranges, dots=True))
     place = case.stream(Sensor.GPS_POSITION)
     if place is not None:
-        traces.append(Trace("gps", "GPS heard", place.t_s, np.zeros(len(place)), dots=True))
+        traces.append(Trace("gps", "GPS received", place.t_s, np.zeros(len(place)), dots=True))
     return (Picture("what there was to go by", tuple(traces)),)

@@ -155,7 +155,7 @@ def noise(case: Case) -> Found:
     window = (float(t_s[noisy[0]]), float(t_s[noisy[-1]])) if len(noisy) else case.flight_s
     figures: dict[str, float | str] = {
         "noise_rad_s": size, "usual_rad_s": float(np.median(jumps)),
-        "told": "nothing" if told is None else f"{told:.2f} rad/s",
+        "told": "no value" if told is None else f"{told:.2f} rad/s",
     }  # fmt: skip
     picture = Picture("flow (rad/s)", (
         Trace("flow", "flow x", t_s, seen[:, 0], dots=True), Trace("gps", "flow y", t_s, seen[:, 1], dots=True),
@@ -164,12 +164,12 @@ def noise(case: Case) -> Found:
 
 
 def _news(values: Array) -> Flags:
-    """Which rows (n,) of columns are no repetition of the one before: a link may tell a reading twice."""
+    """Which rows (n,) of columns are no repetition of the one before: a link may send a reading twice."""
     return np.concatenate([[True], (np.diff(values, axis=0) != 0.0).any(axis=1)])[: len(values)]
 
 
 def _second(values: Array) -> Array:
-    """Second differences of columns (n, 2), of white noise as large as it is."""
+    """Second differences of columns (n, 2), scaled to have the size of white noise itself."""
     second = np.zeros_like(values)
     second[1:-1] = (values[2:] - 2.0 * values[1:-1] + values[:-2]) / np.sqrt(6.0)
     return second

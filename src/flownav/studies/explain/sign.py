@@ -1,4 +1,4 @@
-"""What a hypothesis finds in a log: a sign with its strength, its seconds and its picture; or what the log lacks."""
+"""The result of a hypothesis on a log: a sign with its strength, its seconds and its picture; or what the log lacks."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""What hypotheses look at: a log's readings side by side, filtered, resampled; pure functions of arrays."""
+"""The signals that hypotheses use: a log's readings side by side, filtered, resampled; pure functions of arrays."""
 
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ def running_mean(values: Array, count: int) -> Array:
 
 
 def high_pass(t_s: Array, values: Array, width_s: float) -> Array:
-    """What a running mean of that width leaves of columns (n, k), twice taken off so that its skirts are steep."""
+    """Columns (n, k) less their running mean of that width, which is taken twice so that its skirts are steep."""
     count = max(3, round(width_s / max(float(np.median(np.diff(t_s))), 1e-4)))
     mean = running_mean(running_mean(values, count), count)
     return np.asarray(values - mean)

@@ -1,4 +1,5 @@
-"""The table of hypotheses: one row each, in the order in which they are told. A new cause: a row, a sign, its words.
+"""The table of hypotheses: one row each, in the order in which they are reported. A new cause: a row, a sign, its
+words.
 
 explains: what else such a log shows, and is no cause of its own then.
 """
@@ -50,7 +51,7 @@ class Hypothesis(NamedTuple):
 
 @lru_cache(maxsize=1)
 def words() -> dict[str, dict[str, str]]:
-    """What is said of each cause."""
+    """The words of each cause, by its name."""
     content = tomllib.loads(shipped(WORDS_FILE).read_text(encoding="utf-8"))
     return {name: told for name, told in content.items() if isinstance(told, dict)}
 

@@ -1,7 +1,7 @@
-"""What an autopilot was told: its parameters in either dialect, read into the same few facts.
+"""The settings of an autopilot: its parameters in either dialect, read into the same few facts.
 
 PX4 from 1.14 on (EKF2_*_CTRL, EKF2_HGT_REF) and before (EKF2_AID_MASK, EKF2_HGT_MODE); ArduPilot's EKF3 from 4.1 on
-(EK3_SRC*). A fact that no parameter states is None: what is missing for a hypothesis is said, not guessed.
+(EK3_SRC*). A fact that no parameter states is None: a fact that a hypothesis lacks is reported, not guessed.
 """
 
 from collections.abc import Mapping
@@ -19,7 +19,9 @@ HEIGHTS = {PX4: {0: BARO, 1: GPS, 2: RANGE, 3: VISION}, ARDUPILOT: {1: BARO, 2: 
 
 
 class SourceSet(NamedTuple):
-    """What one of EKF3's source sets takes, or the one that PX4 has. external: velocity or position from outside."""
+    """The sources of one of EKF3's source sets, or of the one that PX4 has. external: velocity or position from
+    outside.
+    """
 
     number: int
     flow: bool
@@ -54,7 +56,7 @@ class Told(NamedTuple):
 
     @property
     def takes_flow(self) -> bool | None:
-        """Whether any source set takes flow; None where nothing says."""
+        """Whether any source set takes flow; None where no parameter states it."""
         return any(one.flow for one in self.sets) if self.sets else None
 
     def set_at(self, number: int) -> SourceSet | None:

@@ -139,7 +139,7 @@ def gps_in_time(case: Case, sign: Sign) -> Repair:
 
 # -- scores ------------------------------------------------------------------------------------------------------
 class Mismatch(NamedTuple):
-    """How far what sensors say lies from a path, over what sound ones do, squared and capped; 1 is sound."""
+    """Distance of the sensors' readings from a path, over that of sound ones, squared and capped; 1 is sound."""
 
     flow: float
     height: float
@@ -147,7 +147,7 @@ class Mismatch(NamedTuple):
 
     @property
     def excess(self) -> float:
-        """What lies above sound, over all."""
+        """The sum of the amounts above 1, which is sound."""
         return sum(max(one - 1.0, 0.0) for one in self)
 
 
@@ -158,9 +158,7 @@ def tried(case: Case, sign: Sign, repairing: Repairing | None) -> Trial:
     log's own heading, the height of its source, GPS as it comes.
     """
     if repairing is None:
-        return Trial(
-            "nothing to replay: what the parameters and the log say decides", None, drift(case, case.base, sign)
-        )
+        return Trial("nothing to replay: parameters and log decide", None, drift(case, case.base, sign))
     repair = repairing(case, sign)
     run = case.replayed(repair.streams, repair.options)
     if run is None:
@@ -208,7 +206,7 @@ def _of_flow(case: Case, streams: Streams, run: Replay, attitude: Stream | None)
 
 
 def _of_height(case: Case, streams: Streams, run: Replay) -> float:
-    """The height's source as the autopilot was told; the barometer where nobody says."""
+    """Mismatch of the height's source that is set in the autopilot; of the barometer where none is set."""
     one = case.told.set_at(1)
     source = Sensor.RANGE if one is not None and one.height == RANGE else Sensor.BARO
     stream = streams.get(source)

@@ -63,7 +63,7 @@ class OfLog(NamedTuple):
 
 
 class Tuned(NamedTuple):
-    """What came out: settings moved, the judgement, and each log's part; runs: how many replays the fit took."""
+    """The result: settings moved, the judgement, and each log's part; runs: how many replays the fit took."""
 
     proposed: list[Proposed]
     judgement: Judgement
@@ -143,8 +143,8 @@ def _ordered(paths: Sequence[Path], logs: Sequence[Log]) -> list[int]:
 
 
 def _knobs(courses: Sequence[Course], settings: NavigatorSettingsFile) -> list[Knob]:
-    """Those that any of the logs could turn; of the start, that so many could. InputError where there is none, or
-    nothing to score.
+    """The knobs that any of the logs can turn; of the start, those that at least LEAST_STARTS logs can. InputError
+    where there is none, or nothing to score.
     """
     found = [knob for course in courses for knob in knobs_of(course.flown.log, settings, starts=True)]
     knobs = [knob for knob in KNOBS if found.count(knob) >= (LEAST_STARTS if knob.start else 1)]
@@ -196,7 +196,7 @@ def settings_text(tuned: Tuned, stated: NavigatorSettingsFile | None, command: s
 
 
 def gain_words(error: Judged | None) -> str:
-    """What the proposal does to the path's error, with the interval."""
+    """The effect of the proposal on the path's error, with the interval."""
     if error is None:
         return "nothing shows the path's error"
     interval = f"95 % interval {error.low:.3f} to {error.high:.3f}, {error.windows} windows"

@@ -1,6 +1,6 @@
-"""What may be tuned, a few settings each by a factor, and which windows of flights are fitted and which judge the fit.
+"""The settings that may be tuned, each by a factor, and which windows of flights are fitted and which judge the fit.
 
-Between two windows lies a gap, so that what lasts of an error in one is not found again in the next.
+Between two windows lies a gap, so that a lasting error in one is not found again in the next.
 """
 
 import math
@@ -21,7 +21,7 @@ MOST_SCALE = 0.35
 FLOW_GAIN = "flow gain"
 
 
-LEAST_STARTS = 3  # a flight starts once: two say nothing of how starts differ
+LEAST_STARTS = 3  # a flight starts once: two do not show how starts differ
 
 
 SHARES = {"flow_lasting_share": "share of the speed", "range_relative_sigma": "share of the range"}
@@ -74,7 +74,8 @@ KNOBS = (  # in the order in which they are sought: what moves the path most com
 
 
 def knobs_of(log: Log, settings: NavigatorSettingsFile, *, starts: bool = False) -> list[Knob]:
-    """Those whose sensor serves in a log and whose settings are not 0; a gain only where something tells the speed.
+    """Those whose sensor serves in a log and whose settings are not 0; a gain only where another sensor gives the
+    speed.
 
     starts: those of the start too.
     """
@@ -101,7 +102,7 @@ def turned(settings: NavigatorSettingsFile, knobs: Iterable[Knob], log_factors: 
 
 
 def rounded(value: float) -> float:
-    """To four digits: no log tells more."""
+    """A value to four digits, which no log exceeds in accuracy."""
     return float(f"{value:.4g}")
 
 
@@ -140,7 +141,7 @@ class Split(NamedTuple):
 
 
 def split_flight(log: Log) -> Split:
-    """Alternate windows of the flight; of the whole log where nobody says when it flew.
+    """Alternate windows of the flight; of the whole log where the flight is not known.
 
     InputError where the flight is too short for LEAST_JUDGES of each kind.
     """
@@ -163,7 +164,7 @@ def too_short(log: Log) -> str | None:
 
 
 def _flight_of(log: Log) -> Window:
-    """From lift-off to touchdown; the whole log where nobody says when that was."""
+    """From lift-off to touchdown; the whole log where these are not known."""
     return airborne_of(log) or log.span_s
 
 

@@ -1,4 +1,4 @@
-"""What one run of a log is worth in each of its windows: what it predicted of its sensors, how far it was off.
+"""The score of one run of a log in each of its windows: how well it predicted its sensors, and its path error.
 
 Both are in nats, so that they may be added: a reading predicted with errors smaller by a factor f, and stated so, is
 worth ln f more, and an error of the path that is smaller by f counts the same ln f.
@@ -66,7 +66,7 @@ class Gains(NamedTuple):
 
 
 def reference_name(log: Log) -> str | None:
-    """What errors of this log's path are measured against, the best that it has; None without any.
+    """The best reference that this log has for errors of its path; None without any.
 
     Without GPS and truth it is the flow: withheld in a window, it is predicted by what is left.
     """
@@ -95,7 +95,7 @@ def scores_of(flown: Replay, windows: Sequence[Window]) -> Scores:
 
 
 def gains_of(run: Scores, start: Scores) -> Gains:
-    """What a run has over the start, window by window; what it no longer predicts costs LOSS_NATS."""
+    """The gains of a run over the start, window by window; a reading that it no longer predicts costs LOSS_NATS."""
     counted = np.isfinite(start.density)
     found = np.where(run.readings >= LEAST_SHARE * start.readings, run.density - start.density, LOSS_NATS)
     found = _tempered(np.where(np.isfinite(found), found, LOSS_NATS))

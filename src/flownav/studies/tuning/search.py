@@ -1,6 +1,6 @@
 """The best factors on the fit windows, one knob after the other, and how sure each of them is; and the verdict.
 
-Do the proposed settings help on windows that the fit never saw? The bootstrap says how surely.
+Do the proposed settings help on windows that the fit never saw? The bootstrap gives the confidence.
 """
 
 import math
@@ -35,7 +35,7 @@ def resampled(by_log: Sequence[Array], seed: int) -> Array:
 
 
 def interval_of(drawn: Array, windows: int) -> tuple[float, float]:
-    """CONFIDENCE interval of a mean of so many windows from its draws (RESAMPLES,): expanded percentiles.
+    """CONFIDENCE interval of a mean of `windows` windows from its draws (RESAMPLES,): expanded percentiles.
 
     Plain percentiles of few windows are too near to each other, by what Student's t is wider than the normal and the
     root of n / (n - 1) (Hesterberg, What Teachers Should Know About the Bootstrap, The American Statistician 69, 2015).
@@ -139,7 +139,9 @@ class Found(NamedTuple):
 
 
 def objective(trials: Trials, log_factors: Array) -> float:
-    """Mean gain over the fit windows, each log counting alike, less the prior as so many windows weigh it [nats]."""
+    """Mean gain over the fit windows, each log counting alike, less the prior's penalty over the number of windows
+    [nats].
+    """
     gains = trials.gains(log_factors)
     return mean_gain(gains) - penalty(trials.knobs, log_factors) / _windows(gains)
 
@@ -150,7 +152,9 @@ def mean_gain(gains: Sequence[Gains]) -> float:
 
 
 def search(trials: Trials, settings: NavigatorSettingsFile) -> Found:
-    """Coordinate search; what cannot be told from the start is put back and the rest sought again, until all can."""
+    """Coordinate search; factors that cannot be distinguished from the start are put back and the rest sought again,
+    until all can be.
+    """
     limits = [limits_of(knob, settings) for knob in trials.knobs]
     kept, steps, best = list(range(len(limits))), STEPS, np.zeros(len(limits))
     while True:
@@ -218,17 +222,17 @@ def _moved(top: Top | None) -> bool:
 
 
 def _worth(trials: Trials, best: Array, k: int) -> float:
-    """What it costs to put one factor back [nats]."""
+    """The cost of putting one factor back [nats]."""
     return objective(trials, best) - objective(trials, _at(best, k, 0.0))
 
 
 def _top(trials: Trials, best: Array, k: int, limits: tuple[float, float]) -> Top:
-    """What the windows alone say of one factor, the others standing: the search's own place is a whole number of steps
-    from the start, and drawn to it by the prior. Where the profile has no top: that place, and the limits.
+    """The estimate of one factor by the windows alone, the others fixed: the search's own place is a whole number of
+    steps from the start, and drawn to it by the prior. Where the profile has no top: that place, and the limits.
 
     By the sandwich of an M-estimator (Huber, Robust Statistics, 1981, section 6.3): the slope of the mean over windows
-    when they are drawn anew, over the curvature of the profile, which is a parabola by least squares. What is unknown
-    at a start differs from log to log and not from window to window: there the logs are the sample.
+    when they are drawn anew, over the curvature of the profile, which is a parabola by least squares. The unknowns at a
+    start differ from log to log and not from window to window: there the logs are the sample.
     """
     span = _step(trials, k, STEPS[0])
     places = np.unique(np.clip(best[k] + span * np.array(PROFILE_STEPS), *limits))

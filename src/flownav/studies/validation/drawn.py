@@ -47,7 +47,7 @@ class RecordedFlight(ParameterModel):
 
 
 class AssumedVehicle(ParameterModel):
-    """What sensor models ask of a vehicle and a log does not tell; path_bandwidth_hz: of the path that is flown."""
+    """Data of a vehicle that sensor models need and a log lacks; path_bandwidth_hz: of the path that is flown."""
 
     thrust_n: Number = Field(gt=0.0, le=1e4)  # of all rotors, all the time; for the wash on the barometer
     rotor_radius_m: Number = Field(gt=0.0, le=10.0)  # of a disc as large as all rotors' together
@@ -106,7 +106,7 @@ def kept_of(stream: Stream) -> int:
 def sheets_of(log: Log, vehicle: AssumedVehicle) -> SensorSheets:
     """The shipped datasheets at the log's rates; a lidar where the log reads nearer than a sonar can.
 
-    Levers are unknown, and the navigator is told of none: sensors sit at the centre of gravity.
+    Levers are unknown, and the navigator is given none: sensors sit at the centre of gravity.
     """
     sheets = shipped_sheets()
     assert sheets.flow_sensor is not None
@@ -169,7 +169,7 @@ Seen = dict[Any, Any]  # records by their kinds
 def readings(
     flight: Flight, name: str, drawn: str, p: Any, seen: Sequence[Seen], step: Callable[..., Any] | None = None
 ) -> list[Any]:
-    """What a carried sensor reads of what it sees, one reading after the other, by the equations of its row.
+    """The readings of a carried sensor, one after the other, by the equations of its row.
 
     drawn: the name of its draws; p: its coefficients; step: its equation, where the row's takes more than the sensor's.
     """
@@ -189,7 +189,7 @@ def readings(
 
 
 def lawful(law: Callable[..., Any], records: Seen) -> Any:
-    """What a law says of the records that its parameters are annotated with."""
+    """The result of a law on the records that its parameters are annotated with."""
     return law(*(records[kind] for name, kind in hints_of(law).items() if name != "return"))
 
 

@@ -19,11 +19,11 @@ from flownav.studies.validation.drawn import rate_hz
 from flownav.studies.validation.path import DOWN, ground_of, rotation_of
 
 AIRBORNE_M = 0.5  # of the range sensor over the ground
-REACH_M = 4.0  # up to here the range sensors of such vehicles hear their echo, and the height is well known
+REACH_M = 4.0  # up to here the range sensors of such vehicles receive their echo, and the height is well known
 BEYOND_M = 6.0  # from here on none of the logs' range sensors can
 OUTLIER_M = 0.3  # of a range from the smoothed height
 LEAST_HIGH_S = 10.0
-BAROMETER_S = 60.0  # slower errors cannot be told from the smoothed altitude's own
+BAROMETER_S = 60.0  # slower errors cannot be distinguished from the smoothed altitude's own
 LATEST_FLOW_S, FLOW_STEP_S = 0.4, 0.01  # lags of the flow that are tried
 LEAST_ROWS = 100  # of flow in flight
 SLOW_SHARE = 0.1  # of the Nyquist frequency: below it white noise has a tenth of its power
@@ -59,7 +59,7 @@ class Smoothed:
 
 
 class FlowFit(NamedTuple):
-    """What of the flow is the velocity: gain, lag [s]; and what is not: robust deviation [rad/s], its colour."""
+    """The fit of the flow by the velocity: gain, lag [s]; and of its residual: robust deviation [rad/s], its colour."""
 
     gain: float
     lag_s: float
@@ -68,7 +68,7 @@ class FlowFit(NamedTuple):
 
 
 def figures_of(flown: Replay) -> dict[str, float]:
-    """Everything but the outages' drift, by the figure's name; NaN where the log cannot say."""
+    """Everything but the outages' drift, by the figure's name; NaN where the log does not show it."""
     assert flown.smoothed is not None
     smoothed = Smoothed(flown.smoothed)
     return {
@@ -184,7 +184,7 @@ def range_figures(log: Log, smoothed: Smoothed) -> dict[str, float]:
 
 
 def beyond_reach(t_s: Array, smoothed: Smoothed) -> dict[str, float]:
-    """Readings a second where there is no echo to hear, of a flight that goes there for LEAST_HIGH_S."""
+    """Readings a second where there is no echo, of a flight that goes there for LEAST_HIGH_S."""
     rows_s = smoothed.said.t_s
     high = smoothed.height_m(rows_s) > BEYOND_M
     high_s = float(np.sum(np.diff(rows_s)[high[1:]]))

@@ -46,7 +46,7 @@ class Row:
 
     @property
     def verdict(self) -> str:
-        """What the figure says of the simulator: too kind where no simulated flight was as hard as the recorded one."""
+        """Verdict on the simulator by this figure: too kind where no simulated flight was as hard as the recorded."""
         if self.flown is None or self.low is None or self.high is None:
             return "unknown"
         flown, low, high = self.flown, self.low, self.high
@@ -64,7 +64,7 @@ class Row:
         return SHARE_SLACK if self.figure.endswith(SHARE_ENDINGS) else 0.0
 
     def as_json(self) -> dict[str, str | float | None]:
-        """What the command prints."""
+        """The figure as the command prints it."""
         return asdict(self)
 
 

@@ -1,4 +1,6 @@
-"""docs/explanation/validation.md: what the figures say of the simulator, in words and as a page without a date."""
+"""docs/explanation/validation.md: the meaning of the figures for the simulator, in words and as a page without a
+date.
+"""
 
 from collections.abc import Sequence
 
@@ -36,8 +38,8 @@ MEANINGS = (
 
 # by the beginning of a figure's name: what the simulator lacks where it is too kind
 LACKS = (
-    ("range_beyond_reach", "A range sensor that hears no echo stays silent in the simulator; the recorded ones go on "
-     "reporting something near. That is a change of the sensor's equation and not made."),
+    ("range_beyond_reach", "A range sensor that receives no echo stays silent in the simulator; the recorded ones go "
+     "on reporting something near. That is a change of the sensor's equation and not made."),
     ("range_outlier", "Recorded outliers are more frequent and come in runs; the simulated echoes are single."),
     ("range", "In flight, ranges have outliers and correlated errors; in the simulator they are cleaner."),
     ("baro", "The barometer's error is one of seconds, by wash and gusts; the simulated one is white noise on a slow "
@@ -80,7 +82,7 @@ def astray(rows: Sequence[Row]) -> list[str]:
 
 
 def lacking(figure: str) -> str:
-    """What the simulator lacks, by the figure's name."""
+    """The effects that the simulator lacks, by the figure's name."""
     return next((words for beginning, words in LACKS if figure.startswith(beginning)), "")
 
 
@@ -103,7 +105,7 @@ def number(value: float | None) -> str:
 
 
 def verdicts(rows: Sequence[Row]) -> str:
-    """How many figures say what, in one sentence."""
+    """The counts of the verdicts, in one sentence."""
     counts = {
         verdict: sum(row.verdict == verdict for row in rows) for verdict in ("as flown", TOO_KIND, TOO_HARD, OTHER)
     }
@@ -131,7 +133,7 @@ the same paths, runs the same navigator on both, and sets the figures beside eac
   three readings of a unit of 100 Hz and more), receiver (in the log's steps), lidar where the log reads below 0.25
   m and else sonar, barometer, compass, and an autopilot's attitude with the errors of the paper's GPS/INS. Who is
   who is drawn by (seed, flight).
-- **Navigator.** `flownav replay` as it is shipped, told nothing of either, with the GPS outages of
+- **Navigator.** `flownav replay` as it is shipped, with no knowledge of either, with the GPS outages of
   `src/flownav/data/validation.toml`, each a replay of its own, with flow and without.
 - **Verdict.** *As flown*: the recorded figure is not more than {slack:g} times beyond the least and largest of the
   simulated flights. *Too kind*: it is worse than that; *too hard*: it is better. The exit status is 1 where the

@@ -1,10 +1,10 @@
 """A recorded flight's path, and how a multirotor moves that flies it: attitude, rates and specific force.
 
-The path is the smoothed estimate of the navigator on the log, height over the ground that its range sensor saw, without
-what is faster than the path's bandwidth. A multirotor has no force but its thrust, along body -z, and the drag of its
-rotors, which grows with the airspeed (Martin, Salaun, The true role of accelerometer feedback in quadrotor control,
-ICRA 2010). Acceleration and airspeed therefore say where body z points, the heading is the recorded one, and the rest
-follows by kinematics:
+The path is the smoothed estimate of the navigator on the log, height over the ground that its range sensor saw,
+without what is faster than the path's bandwidth. A multirotor has no force but its thrust, along body -z, and the
+drag of its rotors, which grows with the airspeed (Martin, Salaun, The true role of accelerometer feedback in
+quadrotor control, ICRA 2010). Acceleration and airspeed therefore give the direction of body z, the heading is the
+recorded one, and the rest follows by kinematics:
 
     z_b = -(a - g + k (v - v_wind)) / |..|,    f = R' (a - g)
 

@@ -1,4 +1,4 @@
-"""What simulated sensors would have logged on a path: every stream at the log's own instants, of the log's own kinds.
+"""The log of simulated sensors on a path: every stream at the log's own instants, of the log's own kinds.
 
 A reading that the log holds at t is taken on the path at t less the sensor's latency; gaps of the log stay gaps. The
 equations are those that the simulator flies (`flownav.sensors`), called reading by reading.

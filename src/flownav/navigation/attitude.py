@@ -37,7 +37,7 @@ with_gap = replacing(ImuMemory, "gap")
 
 
 class MeasuredAttitude(NamedTuple):
-    """What the law of an attitude reads: a quaternion."""
+    """A quaternion, as the observation law of an attitude reads it."""
 
     w: float
     x: float

@@ -21,7 +21,7 @@ from flownav.navigation.verdicts import UNKNOWN_M, Event, Offer, Reset, on_lanes
 
 
 class BaroVerdict(NamedTuple):
-    """What becomes of a pressure height."""
+    """Verdict on a pressure height: memory, reset of the datum, event, and offer to the filter."""
 
     baro: BaroMemory
     reset: Reset

@@ -1,9 +1,9 @@
-"""A heading that is read and wrong: two witnesses that know nothing of it contradict it alike.
+"""Detection of a wrong heading by two witnesses that do not use the compass and contradict it alike.
 
 The flow's velocity by the filter's own heading, and what the accelerometer integrates to by it, are both turned against
-GPS velocity and its changes by the heading's error. Where both say the same large angle, the compass is what errs: it
-is no longer heard, and the heading is sought from the course. Where only the flow says so, its axes may be wrong, and
-nothing is done.
+GPS velocity and its changes by the heading's error. Where both show the same large angle, the compass is wrong: it is
+no longer used, and the heading is sought from the course. Where only the flow shows it, the flow's axes may be wrong,
+and nothing is done.
 """
 
 from typing import NamedTuple
@@ -84,12 +84,12 @@ def refuted(course: CourseMemory, push: PushMemory) -> tuple[bool, float]:
 # -- on lanes -----------------------------------------------------------------------------------------------
 @on_lanes
 def note_push(force: Force, m: PushMemory, *, dt_s: float) -> PushMemory:
-    """What the step that was just made adds to the velocity, by the filter's own heading."""
+    """The block's memory with the velocity that the step just made adds, by the filter's own heading."""
     return with_push(m, push_n=m.push_n + dt_s * force.north_m_s2, push_e=m.push_e + dt_s * force.east_m_s2)
 
 
 class CompassVerdict(NamedTuple):
-    """What the two witnesses say of the compass, and what is set free where they refute it."""
+    """Verdict of the two witnesses on the compass, with the resets that free heading and states where it is refuted."""
 
     course: CourseMemory
     push: PushMemory

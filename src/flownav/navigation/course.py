@@ -47,7 +47,7 @@ def with_flow(north_m_s: float, east_m_s: float, t_s: float, m: CourseMemory) ->
 
 @equation
 def with_gps(reading: Reading, t_s: float, m: CourseMemory) -> CourseMemory:
-    """The sums with one GPS velocity more, where the flow tells of the same motion."""
+    """The sums with one more GPS velocity, where the flow has measured the same motion."""
     v_n, v_e, w_n, w_e = reading.value_0, reading.value_1, m.north_m_s, m.east_m_s
     speed_m_s = np.sqrt(v_n * v_n + v_e * v_e)
     step_s = t_s - m.gps_s
@@ -78,7 +78,7 @@ def judge_course(m: CourseMemory) -> tuple[bool, float]:
 
 @equation
 def is_velocity(reading: Reading) -> bool:
-    """Whether a GPS velocity is heard, and tells north and east."""
+    """Whether a GPS velocity was received, with finite north and east components."""
     return is_heard(reading) and bool(np.isfinite(reading.value_0 + reading.value_1))
 
 
@@ -116,7 +116,7 @@ def note_flow_course(
 
 
 class FoundHeading(NamedTuple):
-    """What the way says of the heading."""
+    """Result of the search for the heading in the course: memories, attitude, reset and event."""
 
     course: CourseMemory
     heading: HeadingMemory

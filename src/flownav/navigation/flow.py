@@ -86,7 +86,7 @@ def offer_component(
 ) -> FlowOffer:
     """One component without turning and gain error, with its variance. A down velocity that no sensor has is NaN.
 
-    All that is said of the noise is said of what the sensor reports: the sensor file's law, which is of the residuals
+    Every stated noise is that of the value as the sensor reports it: the sensor file's law, which is of the residuals
     about gain times velocity, the settings, and a variance that a reading states. So the gain is taken off both.
     """
     raw, listed = component_of(reading, component)
@@ -168,7 +168,7 @@ def walk_alone(
 
 
 class Agreement(NamedTuple):
-    """What a reading of flow leaves: whether it is doubted or trusted anew."""
+    """Memories and event after a reading of flow was found to agree or not: it is doubted, or trusted anew."""
 
     held: HeldBack
     flow: FlowMemory
@@ -233,9 +233,9 @@ def take_flow(
 
 @equation
 def consider_others(work: Work, lanes: Lanes) -> None:
-    """What flow depends on and is no judge of: over a step of the ground it would move the height, and by accelerations
-    that err it would turn the heading; its scale is learnt where GPS holds (`judge_scale`).
-    Where GPS tells the velocity too, that is what corrects the rest.
+    """Consider states that flow depends on and must not correct: over a step of the ground it would move the height,
+    and by accelerations that err it would turn the heading; its scale is learnt where GPS holds (`judge_scale`). Where
+    GPS measures the velocity too, GPS corrects the rest.
     """
     consider(work, lanes, POSITION + 2, RANGE_MISSING)
     consider(work, lanes, GROUND, RANGE_MISSING)

@@ -81,7 +81,9 @@ def sum_looks(reading: Reading, m: FlowSum, *, t_s: float) -> Summed:
 
 @equation
 def gyro_share(reading: Reading) -> float:
-    """By how much the filter's gyro bias is in the turning: the IMU told it, or is what the sensor's gyro follows."""
+    """Share of the filter's gyro bias in the turning: 1 where the turning is the IMU's, or the sensor's gyro is held to
+    the IMU's; else 0.
+    """
     return 1.0 if np.isfinite(reading.value_4 + reading.value_5) else 0.0
 
 

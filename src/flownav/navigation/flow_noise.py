@@ -45,8 +45,8 @@ def flow_variance(range_m: float, speed_m_s: float, quality: float, angular: boo
 
 @equation
 def disputed_variance(look: Look, speed_m_s: float) -> float:
-    """What a height errs by makes of an angular flow's velocity [m2/s2]: the share by which the newest range disputes
-    it. speed_m_s: as reported.
+    """Variance of an angular flow's velocity due to an error of the height [m2/s2]: the speed times the share by which
+    the newest range disputes that height, squared. speed_m_s: as reported.
 
     Over a table's edge, or a ledge, flow and range see different ground for a moment, and neither is known to be below.
     """
@@ -62,7 +62,7 @@ def blindness(quality: float, usual: float) -> float:
 
 @equation
 def blind_variance(range_m: float, quality: float, usual: float, step_s: float, s: FlowSettings) -> float:
-    """What is added where a sensor sees less than half as well as it usually does [m2/s2], of what it reports.
+    """Variance added where a sensor's quality is less than half of its usual one [m2/s2], in what it reports.
 
     Ground without texture is read as ground that stands still, however often it is read: such an error lasts, and does
     not average out as noise does.

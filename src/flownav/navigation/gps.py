@@ -57,7 +57,9 @@ with_reset = replacing(GpsMemory, "told_s", "moved_n_m", "moved_e_m")
 
 # -- what the filter says -------------------------------------------------------------------------------------
 class AlongAxis(NamedTuple):
-    """What the filter says along an axis, NED: position [m], velocity [m/s], and how far off the pad is [m, m2]."""
+    """The filter's estimate along an axis, NED: position [m], velocity [m/s], and the pad's offset with its variance
+    [m, m2].
+    """
 
     position_m: float
     velocity_m_s: float
@@ -67,7 +69,7 @@ class AlongAxis(NamedTuple):
 
 @equation
 def along_axis(work: Work, lanes: Lanes, axis: int, lane: int) -> AlongAxis:
-    """What the filter says along an axis of a lane."""
+    """The filter's estimate along an axis of a lane."""
     position_m = row_of(work, lanes, STATE + POSITION + axis, lane)
     both = variance_of(work, lanes, POSITION + axis, lane) + variance_of(work, lanes, PAD + axis, lane)
     variance = both - 2.0 * covariance_of(work, lanes, PAD + axis, POSITION + axis, lane)
@@ -103,8 +105,8 @@ def judge_fix(
 
 @equation
 def lag_variance(start: StartMemory, steady: SteadyForce, s: GpsSettings) -> float:
-    """What a receiver's smoothing leaves over in its velocity [m2/s2]: the lag that is estimated (`gps_velocity`) is
-    one number for a smoothing that is none, and leaves a share LAG_LEFT of its doubt times the acceleration.
+    """Variance of a GPS velocity due to the receiver's smoothing [m2/s2]: the lag that is estimated (`gps_velocity`) is
+    one number, which a smoothing is not, and leaves a share LAG_LEFT of its doubt times the acceleration.
     """
     lag_s = LAG_LEFT * s.gps_velocity_lag_sigma_s if start.started > 0.0 else 0.0
     return lag_s * lag_s * squared_acceleration(steady)
@@ -183,7 +185,7 @@ def gone_to_gps(
 
 
 class FixFate(NamedTuple):
-    """What follows from the fate of a fix along an axis. pad_goes: the pad is tied to the vehicle anew."""
+    """Consequences of a fix's fate along an axis. pad_goes: the pad is tied to the vehicle anew."""
 
     memory: FixMemory
     goes: tuple[Reset, Reset, Reset]

@@ -40,7 +40,7 @@ def heading_variance(t_s: float, m: HeadingMemory, s: AttitudeSettings) -> float
 
 
 class HeadingVerdict(NamedTuple):
-    """What becomes of a heading."""
+    """Verdict on a heading: memory and offer."""
 
     heading: HeadingMemory
     offer: Offer

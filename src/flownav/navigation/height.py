@@ -94,11 +94,12 @@ def repeated_variance(variance: float, lasting_s: float) -> float:
 
 @equation
 def repeats(t_s: float, m: RangeMemory, height: Height, alone: bool, s: HeightSettings) -> bool:
-    """Whether the range has repeated one value to the last digit for long: no news, and not what a vehicle does.
+    """Whether the range has repeated one value to the last digit for so long that it carries no information and no
+    vehicle does so.
 
     In a still hover a sensor of 1 cm repeats itself for a second or two, and is right; it served until then. One that
-    says the same from the first on, or while the height travels, or for ever, is out of its reach, or stuck.
-    Where no barometer, GPS or pad has told the height lately, the range is all there is, and it is believed unless
+    repeats a value from the first reading on, or while the height travels, or for ever, is out of its reach, or stuck.
+    Where no barometer, GPS or pad has measured the height lately, the range is all there is, and it is believed unless
     the height travels by more than the filter's own drift.
     """
     lasting_s = t_s - m.same_s
@@ -190,7 +191,7 @@ def sought_ground(
 
 
 class RangeVerdict(NamedTuple):
-    """What becomes of a range."""
+    """Verdict on a range: memory, events, reset, sign of an offset, and offer."""
 
     memory: RangingMemory
     stuck: Event
@@ -229,7 +230,7 @@ def judge_range(
 
 
 class Refusal(NamedTuple):
-    """What follows from the fate of a range. again: the ground was found anew, and the reading is offered once more."""
+    """Consequences of a range's fate. again: the ground was found anew, and the reading is offered once more."""
 
     fate: Fate
     memory: RangingMemory
@@ -316,6 +317,6 @@ def take_range(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Ou
     conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
     watch_whiteness(work, lanes, t_s, 2)
     follow_noise(work, lanes, t_s, OF_RANGE, s.gate_sigma)
-    if judge_refusal(work, lanes, t_s, s, o):  # the ground was found anew: the reading that said so is fused
+    if judge_refusal(work, lanes, t_s, s, o):  # the ground was found anew: the reading that showed it is fused
         range_along_boresight(work, lanes, 0, s.range_below_m, s.range_forward_m, s.range_right_m)
         fuse_offered(work, lanes, s.gate_sigma, o)

@@ -11,7 +11,7 @@ from flownav.navigation.records import Reading
 
 (FUSED, INNOVATION_GATE, NO_DATA, NOT_FINITE, OUT_OF_RANGE, NO_HEIGHT, TILTED, BEFORE_START, DATUM, OUTAGE,
  DUPLICATE, LATE, STUCK, NEAR_GROUND, NOT_NEEDED, AHEAD, NO_HEADING) = map(int, Reason)  # fmt: skip
-SILENT = -1  # nothing is said of this component in this lane: there was no reading, or the filter has not started
+SILENT = -1  # no row for this component in this lane: there was no reading, or the filter has not started
 
 
 @equation
@@ -40,7 +40,7 @@ def usable(reading: Reading, value: float, variance: float, started: float) -> i
 
 @equation
 def usable_in_flight(reading: Reading, value: float, variance: float, started: float) -> int:
-    """What `usable` says, of a sensor of which nothing is said before the start."""
+    """The reason by `usable`, or SILENT before the start, for a sensor that writes no row before the start."""
     return SILENT if started == 0.0 else usable(reading, value, variance, started)
 
 

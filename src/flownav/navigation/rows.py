@@ -61,7 +61,7 @@ class EstimateRow(NamedTuple, Generic[Value]):
 
 
 class InnovationRow(NamedTuple, Generic[Value]):
-    """What became of one component of a reading; t_s: the instant that it describes.
+    """Outcome of one component of a reading; t_s: the instant that it describes.
 
     sensor: `measurement.Sensor`; component: of its observation; innovation, its variance and test_ratio are NaN where
     nothing was tested; reason: `gating.Reason`.
@@ -107,7 +107,7 @@ store_estimate, store_innovation, store_event = map(row_store, (EstimateRow, Inn
 def innovation_row(
     work: Work, lanes: Lanes, lane: int, t_s: float, sensor: int, component: int
 ) -> InnovationRow[float]:
-    """What became of one lane's component; where nothing was tested, what a test says is NaN."""
+    """Outcome of one lane's component; where nothing was tested, the test's values are NaN."""
     reason = work[REASON * len(lanes) + lane]
     tested = reason != BEFORE_START and reason != DUPLICATE and reason != LATE
     return InnovationRow(
@@ -122,8 +122,8 @@ def innovation_row(
 # -- the estimate ------------------------------------------------------------------------------------------
 @equation
 def of_unknown_scale(work: Work, lanes: Lanes, state: int, lane: int) -> float:
-    """What a flow scale that nothing tells makes of a level position [m], from the start on, or velocity [m/s]: one
-    standard deviation.
+    """Error of a horizontal position [m], from the start on, or velocity [m/s] due to a flow scale that no sensor
+    determines: one standard deviation.
     """
     unknown: float = work[SCALE_DOUBT * len(lanes) + lane] * work[(STATE + state) * len(lanes) + lane]
     return unknown
@@ -192,7 +192,7 @@ extra_deviations = gathering(deviation_of, EXTRA_STATES)
 
 @equation
 def estimate_row(work: Work, lanes: Lanes, lane: int, t_s: float) -> EstimateRow[Any]:
-    """What one lane's filter says."""
+    """One lane's estimate as a row, with standard deviations and protection levels."""
     started = load_start(work, lanes, lane).started > 0.0
     rotation = rotation_of(work, lanes, lane)
     velocity = load_velocity(work, lanes, lane)

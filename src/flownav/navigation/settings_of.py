@@ -1,8 +1,9 @@
-"""From datasheets to what the navigator is told: the one way, for every job.
+"""From datasheets to the navigator's settings: the one way, for every job.
 
-What no sheet says keeps its default, and what a user states in a settings file stands above what a sheet says.
-Standard deviations that a sheet gives for units of its kind become the filter's for this one; densities are one-sided
-in sheets and two-sided in the filter, where white noise of density N lets its integral's variance grow by N^2 t/2.
+A value that no sheet states keeps its default, and what a user states in a settings file stands above what a sheet
+states. Standard deviations that a sheet gives for units of its kind become the filter's for this one; densities are
+one-sided in sheets and two-sided in the filter, where white noise of density N lets its integral's variance grow by N^2
+t/2.
 """
 
 import math
@@ -63,7 +64,7 @@ def settings_of(
     flow_noise_stated: bool = False,
     rotor_hz: tuple[float, float] | None = None,
 ) -> Told:
-    """What a navigator is told of these sensors.
+    """The navigator's settings for these sensors.
 
     flow: the flow sensor's file, else the sheets'. stated: a user's own settings; the keys that stand in it are kept.
     flow_noise_stated: the flow's noise is the file's law of the height, not that of the reading's quality.
@@ -307,8 +308,8 @@ def of_range_sensor(sheet: RangeSensorSheet) -> Keys:
 def of_barometer(sheet: BarometerSheet) -> Keys:
     """Noise, and drift as the walk that it is over short times.
 
-    A rotor's wash is an error of the default's size that lasts while the vehicle manoeuvres: as white noise of so many
-    readings a second it weighs sqrt(2 tau rate) times as much.
+    A rotor's wash is an error of the default's size that lasts while the vehicle manoeuvres: as white noise at the
+    sheet's rate it weighs sqrt(2 tau rate) times as much.
     """
     drift = sheet.drift_sigma_m * math.sqrt(2.0 / sheet.drift_tau_s) if sheet.drift_tau_s > 0.0 else 0.0
     calm = math.hypot(sheet.sigma_m, sheet.resolution_m / math.sqrt(12.0), CLIMB_M_S * sheet.lag_s)

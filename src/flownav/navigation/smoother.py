@@ -67,7 +67,7 @@ class Backward(NamedTuple):
 
 
 def smooth(queue: EventQueue, running: Running, chunk: int = EVENTS_AT_ONCE) -> Array:
-    """Run a navigator that has heard nothing through a queue; its estimates smoothed, (n, ESTIMATE_COLUMNS).
+    """Run a new navigator through a queue; its estimates smoothed, (n, ESTIMATE_COLUMNS).
 
     The rows are those of the tape's estimate, at the same instants. No state is merely considered in this run: what
     goes back over a correction is that of the gain P h'/S. The tape is left as such a run leaves it.

@@ -4,8 +4,8 @@ With its motors off an IMU is quieter than in any flight, and its gyro then read
 running it is not, but a vehicle whose range reads what it reads on the ground, and does not change, while the flow
 shows no motion, has no velocity worth the name; nor does it turn much over the whole of the stand, so that the mean of
 its gyro is the bias to within SLIP_RAD or SETTLE_RAD over its length, and what its shaking leaves in a mean. Nothing is
-taught above the height of contact. Where a range says nothing any more, as some do on the ground, what it said last
-tells whether the ground is there.
+taught above the height of contact. Where a range gives no data any more, as some do on the ground, its last value
+decides whether the ground is there.
 """
 
 from typing import NamedTuple
@@ -43,7 +43,7 @@ WINDOW_S = 0.5  # chosen: what stands for 2 s is known within 2 s (test_hard_fli
 # A stand is held to be one so often: an accelerometer that rotors make read 3 m/s2 too much as they spin up is 0.8 m/s
 # of velocity, and 0.2 m, in a window
 HOLD_S = 0.1
-SLACK_S = 1e-6  # of instants that are told in microseconds
+SLACK_S = 1e-6  # of instants that are stated in microseconds
 # On the ground ranges read 0.02 (indoor-made), 0.05 (voxl) and 0.13 (outdoor); a hover at 0.3 m
 # must teach no gyro (test_hard_flights).
 NEAR_M = 0.15
@@ -58,7 +58,7 @@ BELIEVED_SIGMAS = 2.0  # a bias that rest contradicts by more is opened: chosen,
 
 # -- the end of a window, and on the way ---------------------------------------------------------------------
 class Stand(NamedTuple):
-    """What a vehicle does; whether it stands, in any lane."""
+    """State of motion of a vehicle with its event; any: whether it stands, in any lane."""
 
     stand: StandMemory
     event: Event
@@ -67,7 +67,7 @@ class Stand(NamedTuple):
 
 @on_lanes
 def judge_stand(start: StartMemory, gyro: ImuWindow, seen: SeenWindow, m: StandMemory) -> Stand:
-    """What the vehicle did in the window, and the range where it rests."""
+    """State of motion in the window, and the range where the vehicle rests."""
     does = judge_standing(gyro, seen, m.contact_m, m.last_m)
     lower = (
         does == SHAKEN
@@ -152,11 +152,12 @@ def offer_rest(
 
 @equation
 def stand_turning(windows: float, axis: int) -> float:
-    """The variance of a window's mean turning about its gyro's bias [(rad/s)^2], of a vehicle that has stood for so
-    many windows with its motors on: what it turns over the whole stand is bounded, not what it turns in each window.
+    """The variance of a window's mean turning about its gyro's bias [(rad/s)^2], of a vehicle that has stood for that
+    number of windows with its motors on: what it turns over the whole stand is bounded, not what it turns in each
+    window.
 
-    A stand of n windows tells the rate to within the bound over its time T = n WINDOW_S, which is an information of
-    T^2 / bound^2; a window's is what T^2 grew by.
+    A stand of n windows determines the rate to within the bound over its time T = n WINDOW_S, which is an information
+    of T^2 / bound^2; a window's is what T^2 grew by.
     """
     bound = SLIP_RAD if axis == 2 else SETTLE_RAD
     rate = bound / WINDOW_S
@@ -231,7 +232,7 @@ def hold_stand(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) -> floa
 
 @procedure
 def close_window(work: Work, lanes: Lanes, ended: float, t_s: float, p: Work, o: Output) -> None:
-    """What a window that has ended teaches; the next begins."""
+    """Learn from a window that has ended; the next begins."""
     s = load_place_settings(p)
     if ended == ENDED_STANDING:
         learn_bias(work, lanes, s.gate_sigma, o)

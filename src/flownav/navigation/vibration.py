@@ -27,14 +27,14 @@ DOUBT_LASTS_S = 60.0
 FREED_WALK_M_S2_RT_S = 0.02  # of a bias, for each time that the accelerometer is noisier than told
 with_doubt = replacing(ImuMemory, "doubt_m_s2")
 with_shaking = replacing(ImuMemory, "doubt_m_s2", "shaken_most")
-# So many times as before, and another vibration has begun, as when rotors spin up; one that has ended is forgotten
-# after so long. Both chosen: where every gust adds its share, the minutes without GPS of `outdoor` err by 0.77 instead
+# TWICE as much as before, and another vibration has begun, as when rotors spin up; one that has ended is forgotten
+# after FADING_S. Both chosen: where every gust adds its share, the minutes without GPS of `outdoor` err by 0.77 instead
 # of 0.68
 TWICE, FADING_S = 2.0, 300.0
 
 BIAS_LIMIT_SIGMAS = 3.0  # standard deviations that a limit leaves room for: chosen, as in `settings_of`
 # The ground has followed a height that errs: as many times what the range still contradicts may both be off. With 1 the
-# height of `flownav faults --offline --faults imu_bias` is beyond 3 sigma for 12 s unsaid, with 3 for 1 s.
+# height of `flownav faults --offline --faults imu_bias` is beyond 3 sigma for 12 s undetected, with 3 for 1 s.
 WITH_GROUND = 3.0
 DOUBTED_SPEED_M_S = 1.0  # what it may have done to the velocity: half a second of DOUBT_M_S2
 
@@ -119,7 +119,7 @@ def doubted_imu(
     """The range contradicts the motion that the accelerometer made: height, climb and vertical bias are set free.
 
     Where the range crept, the ground followed the height before, and the accelerometer may err on every axis; where it
-    jumped, it may be an echo. The memory, what is said of it, and the doubts; where not doubted, all as before.
+    jumped, it may be an echo. The memory, its event, and the doubts; where not doubted, all as before.
     """
     says = doubted and m.doubt_m_s2 < 0.5 * DOUBT_M_S2
     off_m = WITH_GROUND * contradiction_m if doubted else 0.0
@@ -136,7 +136,7 @@ def doubted_imu(
 
 
 class Shaken(NamedTuple):
-    """What vibration does over a step."""
+    """Memory of vibration after a step, and the doubts that it causes."""
 
     imu: ImuMemory
     doubts: tuple[Doubt, Doubt, Doubt, Doubt, Doubt, Doubt, Doubt, Doubt, Doubt]

@@ -1,4 +1,4 @@
-"""What is read over half a second, and what it must show before a vehicle is said to stand; `still` uses it."""
+"""Readings over half a second, and the limits that they must keep before a vehicle is taken to stand (`still`)."""
 
 from typing import NamedTuple
 
@@ -94,7 +94,7 @@ def is_steady(m: SeenWindow) -> bool:
 
 @equation
 def contact_range(contact_m: float) -> float:
-    """What a range reads at most of a vehicle on the ground [m]. contact_m: as it rested before, or NaN."""
+    """Largest range of a vehicle on the ground [m]. contact_m: as it rested before, or NaN."""
     return larger(CONTACT_M, contact_m + STEADY_RANGE_M if np.isfinite(contact_m) else 0.0)
 
 
@@ -107,7 +107,7 @@ def flow_speed(m: SeenWindow) -> float:
 
 @equation
 def judge_standing(gyro: ImuWindow, seen: SeenWindow, contact_m: float, last_m: float = np.nan) -> float:
-    """What a vehicle does that read this over a window: MOVES, SHAKEN, RESTS.
+    """State of motion of a vehicle by its readings over a window: MOVES, SHAKEN, RESTS.
 
     contact_m: the range when it rested before; last_m: the last range before this window; NaN where not known.
     """

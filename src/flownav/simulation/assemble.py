@@ -40,9 +40,9 @@ CORNER_S = 1.5  # a corner is flown at constant acceleration for so long: take-o
 
 @dataclass(frozen=True)
 class Setup:
-    """A scenario made ready: the numbers the kernel takes, and what reports say of them.
+    """A scenario made ready: the numbers that the kernel takes, and their description for reports.
 
-    fitted: the sensors that feed the navigator, and what it is told; None where the paper's filter flies. file: the
+    fitted: the sensors that feed the navigator, and its settings; None where the paper's filter flies. file: the
     vehicle's, as it is believed to be, and described: the same with its uncertainties. dispersion: what an ensemble
     draws.
     """
@@ -180,7 +180,7 @@ def _may_learn(scenario: Scenario, hover: kinds.AnyTrim) -> bool:
 
 
 def _learns(scenario: Scenario, vehicle: kinds.AnyVehicle, hover: kinds.AnyTrim) -> Told | None:
-    """What is believed of a vehicle that may learn itself."""
+    """Beliefs about a vehicle that may learn itself; None where it may not."""
     if not _may_learn(scenario, hover) or not isinstance(hover, Trim) or isinstance(vehicle, MultirotorParameters):
         return None
     learning = scenario.autopilot.learning
@@ -204,7 +204,7 @@ def _plan(
     scenario: Scenario, vehicle: kinds.AnyVehicle, hover: kinds.AnyTrim, gains: AutopilotGains,
     dispersion: dict[str, Distribution],
 ) -> FlightPlan:  # fmt: skip
-    """What the loop is asked to do."""
+    """The flight plan for the loop."""
     section = scenario.flight
     linear = scenario.truth == "linear"
     on_ground = section.start == "ground" and not linear

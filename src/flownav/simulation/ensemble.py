@@ -1,4 +1,5 @@
-"""An ensemble: flights each with a truth of its own, drawn from the scenario's dispersion, that nobody told the filter.
+"""An ensemble: flights each with a truth of its own, drawn from the scenario's dispersion, which the filter does not
+know.
 
 The navigator's settings, its timetable and the autopilot's gains stay those of the datasheets. A truth is a function of
 (seed, flight) alone, so that a flight is the same by itself, in any batch and on any lane.
@@ -82,10 +83,10 @@ def recirculation_of(
 
 
 class Ensemble:
-    """What differs from flight to flight of one scenario, ready to be drawn. InputError where an entry cannot be.
+    """Dispersed numbers of one scenario, ready to be drawn for each flight. InputError where an entry cannot be.
 
     file and described: the vehicle's, as it is believed to be; sheets: its sensors', None where the paper's filter
-    flies, of whose sensors only the flow sensor's file is dispersed; dispersion: entries by dotted name. design: what
+    flies, of whose sensors only the flow sensor's file is dispersed; dispersion: entries by dotted name. design:
     spreads them over the flights; None: the noise counter.
     """
 
@@ -215,7 +216,7 @@ class Ensemble:
             raise self._wrong(name, str(error)) from None
 
     def believed_of(self, name: str) -> float:
-        """What the datasheet says of a number."""
+        """The datasheet's value of a number. InputError where there is none."""
         source, _, key = name.partition(".")
         inside: Any = self.contents[source]
         for part in key.split("."):

@@ -1,4 +1,4 @@
-"""The parts of one epoch of the closed loop: what is flown on, the outer and the attitude loop, the plant."""
+"""The parts of one epoch of the closed loop: the autopilot's estimate, the outer and the attitude loop, the plant."""
 
 from typing import NamedTuple
 
@@ -44,7 +44,7 @@ over_home = replacing(Estimate, "pos_n", "pos_e", "pos_d")
 
 @PLANT.on_lanes
 def estimate_for_autopilot(state: HelicopterState, said: Estimated, felt: Felt, *, on_truth: bool) -> Estimate:
-    """What the outer loop flies on: the filter's estimate or the truth, and the force that the IMU felt."""
+    """The outer loop's feedback: the filter's estimate or the truth, and the specific force read by the IMU."""
     return Estimate(
         state.pos_n if on_truth else said.pos_n_m,
         state.pos_e if on_truth else said.pos_e_m,
@@ -162,7 +162,7 @@ def steer_blades(
 
 @equation
 def asked(stir: Stir, lon: float, lat: float) -> Stir:
-    """What has been asked of the cyclics in this epoch, with one step of the attitude loop more."""
+    """The stir with one more step of the attitude loop added to the cyclic commands of this epoch."""
     return Stir(
         stir.lon + stir.lon_step, stir.lat + stir.lat_step, stir.lon_step, stir.lat_step,
         stir.asked_lon + lon / ATTITUDE_STEPS, stir.asked_lat + lat / ATTITUDE_STEPS,
@@ -215,7 +215,7 @@ def move(work: Work, lanes: Lanes, dt: float, flight: Flight, onboard: Onboard |
 
 @equation
 def observe(work: Work, lanes: Lanes, flight: Flight, onboard: Onboard | None, own: OwnParts | None) -> None:
-    """Thrust, ground load and power of the present state; somebody else's vehicle has said them as it moved."""
+    """Thrust, ground load and power of the present state; a user's own vehicle has reported them as it moved."""
     if own is None or own.step == 0:
         observe_vehicle(work, lanes, flight.rotors, onboard)
 

@@ -1,10 +1,10 @@
-"""From a scenario to the sensors that feed the navigator: datasheets, clocks, and what the navigator is told.
+"""From a scenario to the sensors that feed the navigator: datasheets, clocks, and the navigator's settings.
 
 **The timetable**, one for all flights of a scenario. Every reading has three times: the instant at which it was taken,
 the instant that it describes as far as anybody knows (`t_s`: its arrival less the age that the datasheet states;
 arrivals are uneven, so this is off by the jitter), and the epoch in which the navigator takes it, a fixed horizon
 later. Readings are taken in the order of `t_s`, as a live session's horizon releases them. The timetable is a
-scenario's, not a flight's: what differs from flight to flight is what was read and whether it arrived.
+scenario's, not a flight's: only the values and whether they arrived differ from flight to flight.
 """
 
 from __future__ import annotations
@@ -48,7 +48,8 @@ START_WAIT_S = 10.0  # the navigator's default start_wait_s
 
 
 class Fitted(NamedTuple):
-    """What flies: sensors, their timetable, the navigator's settings (and packed), its equipment, the sheets.
+    """The equipment of a flight: sensors, their timetable, the navigator's settings (and packed), its equipment, the
+    sheets.
 
     ages_s: how old the navigator takes a reading to be on arrival, by `measurement.Sensor`.
     """
@@ -78,7 +79,7 @@ def fitted(scenario: Scenario, flow_sensor: FlowSensor, vehicle: AnyVehicle, epo
 
 
 def packed(told: Told, equipment: Equipment) -> Array:
-    """What the navigator is told, as its kernels take it."""
+    """The navigator's settings, as its kernels take them."""
     sigma = told.settings.start_sigma(has_heading=True, compass=True)
     return pack(told.settings.settings(equipment, told.noise), sigma)
 
@@ -95,9 +96,9 @@ def refitted(
     carried: Fitted, epochs: int, *, told: Told | None = None, onboard: Onboard | None = None,
     stated: dict[Sensor, Timing] | None = None,
 ) -> Fitted:  # fmt: skip
-    """A vehicle whose navigator is told something else, or that carries something else; what is None stays.
+    """The same vehicle with other settings of its navigator, or other sensors; what is None stays.
 
-    stated: how old readings are said to be; how old they are stays.
+    stated: ages of readings as the navigator takes them; the true ages stay.
     """
     told, onboard, stated = told or carried.told, onboard or carried.onboard, stated or carried.timing
     return carried._replace(
@@ -123,7 +124,7 @@ def sheets_of(scenario: Scenario, flow_sensor: FlowSensor, vehicle: AnyVehicle) 
 
 
 def carried_sheets() -> type[SensorSheets]:
-    """The model of all sheets: those that the navigator may be told of, and what else is carried."""
+    """The model of all sheets: those that the navigator may use, and the other sensors that are carried."""
     others: dict[str, Any] = {
         one.name: (one.sheet | None, None) for one in CARRIED if one.name not in SensorSheets.model_fields
     }

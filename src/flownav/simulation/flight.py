@@ -187,7 +187,7 @@ def note_history(
     work: Work, lanes: Lanes, epoch: int, reference: Reference, flight: Flight, onboard: Onboard | None,
     history: NDArray[np.float64],
 ) -> None:  # fmt: skip
-    """What an epoch shows, into the flights' history."""
+    """Write an epoch into the flights' history."""
     write_history(work, lanes, epoch, reference, history)
 
 
@@ -212,8 +212,8 @@ def fly(
 def fly_block(flight: Flight, truth: NDArray[np.float64], block: Block, buffers: Buffers, take: int) -> None:
     """Fly the flights of a block, whose lane buffer is scratch, zeroed here.
 
-    truth: `truth.packed_truth` of the lanes. Of the buffers the navigator, taken at the address `take`, has heard
-    nothing; tape, what it is fed and history are filled.
+    truth: `truth.packed_truth` of the lanes. The buffers' navigator, taken at the address `take`, is a new one; the
+    tape, the readings fed and the history are filled.
     """
     lanes, tape, work = block.lanes, buffers.tape, block.work
     for i in range(work.size):
@@ -273,7 +273,7 @@ def run_paper_filter(work: Work, lanes: Lanes, epoch: int, model: PaperModel) ->
 
 
 class Stated(NamedTuple):
-    """What the filter says."""
+    """The filter's estimate and its spread."""
 
     estimated: Estimated
     spread: Spread

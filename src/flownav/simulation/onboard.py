@@ -27,7 +27,7 @@ SETTLED_S = 2.0  # the skids take the weight as the collective goes down: chosen
 
 
 class Clock(NamedTuple):
-    """When a sensor reads: every so many epochs from the first on; fitted: how many readings it then gives, or none."""
+    """When a sensor reads: each `every` epochs from the first on; fitted: how many readings it then gives, or none."""
 
     fitted: int
     every: int
@@ -95,7 +95,7 @@ def place_of(state: HelicopterState, place: Place) -> tuple[float, float, float]
 
 @equation
 def beam_of(state: HelicopterState, place: Place, ground: Ground) -> BeamHit:
-    """What a lens looks at along body down."""
+    """The distance along body down from a lens to the ground, and the point that it hits."""
     rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
     north, east, down = place_of(state, place)
     return beam_distance(north, east, -down, rotation, ground)
@@ -128,7 +128,7 @@ def clock_of(sheet: SensorSheet, phase: int, readings: int) -> Clock:
 
 
 class Wishes(Protocol):
-    """What a scenario says of sensors itself, above their files."""
+    """Sensor settings that a scenario states itself, above the sensors' files."""
 
     @property
     def gps(self) -> GpsInsSettings:
@@ -144,12 +144,14 @@ class Wishes(Protocol):
 
 
 def as_filed(scenario: Wishes, sheet: Sheet, lens_down_m: float) -> Sheet:
-    """What its file says."""
+    """The sheet as its file has it, on the simulator's clock."""
     return on_clock(sheet)
 
 
 def inertial_sheet(scenario: Wishes, sheet: InertialSheet, lens_down_m: float) -> InertialSheet:
-    """The IMU at the lowest rate, not below its own, whose period is so many physics steps that an epoch has."""
+    """The IMU at the lowest rate, not below its own, whose period is a whole number of physics steps that divides an
+    epoch.
+    """
     steps = [n for n in range(1, STEPS_AN_EPOCH + 1) if STEPS_AN_EPOCH % n == 0]
     fast = [n for n in steps if 1.0 / (n * PHYSICS_PERIOD_S) >= float(sheet.rate_hz) - 1e-6]
     return sheet.model_copy(update={"rate_hz": 1.0 / (max(fast or steps[:1]) * PHYSICS_PERIOD_S)})

@@ -1,4 +1,6 @@
-"""What a flight is: the plan, the vehicle, the sensors and the rates of the loop, as numbers that kernels take."""
+"""Description of a flight: the plan, the vehicle, the sensors and the rates of the loop, as numbers that kernels
+take.
+"""
 
 from typing import NamedTuple
 
@@ -39,7 +41,7 @@ class Happens(NamedTuple):
 
 
 class FlightPlan(NamedTuple):
-    """What a scenario asks of the loop, as numbers the kernel takes."""
+    """A scenario's demands on the loop, as numbers that the kernel takes."""
 
     epochs: int
     start: AnyState
@@ -51,7 +53,7 @@ class FlightPlan(NamedTuple):
     minds_faults: bool  # a suspected fault is a reason to go around: the navigator follows what faults would do
     home_at_start: bool  # the pad is where the estimate first puts the start, else at the filter's origin
     start_known: bool  # the paper's filter starts at the true position, else at the first GPS reading
-    handover_s: float  # until then the vehicle is flown on the truth, where it does not stand on its skids
+    handover_s: float  # until then the autopilot uses the truth, where it does not stand on its skids
     happens: Happens
     draws: Draws
 

@@ -1,4 +1,4 @@
-"""What the noise of a flight is: every standard normal that it draws, by name, and the normals themselves.
+"""Noise of a flight: every standard normal that it draws, by name, and the normals themselves.
 
 For those who ask which noise made a flight what it was; the kernel draws its own.
 """

@@ -42,7 +42,9 @@ ZIP_ERRORS = (
 
 
 def marked(text: str, comment: tuple[str, str] = HASH) -> bytes:
-    """A text as a file's bytes, with the mark. comment: how one begins and ends; what is no text is spelt out."""
+    """A text as a file's bytes, with the mark. comment: how one begins and ends; bytes that are no text are written as
+    escapes.
+    """
     first = DECLARATION if text.startswith(DECLARATION) else ""
     rest = text[len(first) :].encode("utf-8", errors="backslashreplace")
     return f"{first}{comment[0]}{LINE}{hashlib.sha256(rest).hexdigest()}{comment[1]}\n".encode() + rest

@@ -57,7 +57,7 @@ def begin_beside(module: str, name: str) -> None:
 
 @contextmanager
 def meanwhile(work: Callable[[], object]) -> Iterator[None]:
-    """What this process does while it waits for the other one's unit, within the block: what is needed next anyway.
+    """Within the block, run `work` while this process waits for the other one's unit: work that is needed next anyway.
 
     Where nothing is waited for it is not done.
     """

@@ -189,7 +189,7 @@ def row_view(record: type) -> Callable[[NDArray[np.float64]], Any]:
 
 @equation
 def row_of(work: Any, lanes: tuple[int, ...], row: int, lane: int) -> float:
-    """What stands in a row of a lane."""
+    """The number in a row of a lane."""
     value: float = work[row * len(lanes) + lane]
     return value
 

@@ -5,8 +5,8 @@ import closure of the kernel's module (`closure.py`), the types of its arguments
 and the versions of the compilers. It begins with a checksum of the rest. Files are looked for first among those that
 a wheel carries, which nobody writes, then in the user's cache (`FLOWNAV_CACHE`, `~/.cache/flownav`).
 
-What is damaged is compiled anew and replaced. A folder that cannot be written, or that somebody else owns or may write
-to (a cache holds code that is run), is not used, which is said in one line on standard error.
+A damaged file is compiled anew and replaced. A folder that cannot be written, or that somebody else owns or may write
+to (a cache holds code that is run), is not used, with one line on standard error.
 """
 
 import hashlib
@@ -147,7 +147,9 @@ STORE = Store(cache_folder(), SHIPPED)
 
 
 def depends_also(module: str, laws: Collection[Callable[..., Any]], said: str) -> None:
-    """Whatever is compiled from a module is, in this process, also made of these laws, and of what is said."""
+    """Note that all code compiled from a module is, in this process, also made of these laws, and of the text
+    `said`.
+    """
     generated = " ".join(law.__code__.co_filename for law in laws if law.__code__.co_filename.startswith("<flownav"))
     others = {law.__module__ for law in laws if not law.__code__.co_filename.startswith("<flownav")}
     STORE.sources.extend(module, others, f"{said} {generated}")

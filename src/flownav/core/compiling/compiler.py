@@ -1,4 +1,4 @@
-"""What compiles equations, kernels and units: Numba, with our target, our passes and our cache."""
+"""The compiler of equations, kernels and units: Numba, with our target, our passes and our cache."""
 
 from collections.abc import Callable
 from typing import Any, cast

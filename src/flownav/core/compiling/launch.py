@@ -1,9 +1,9 @@
 """Functions of one thread, run by many: on a CUDA device, or in Numba's simulator of one.
 
-A function takes the number of its thread and how many threads there are, then what it is told: numbers, arrays and
-named tuples of them. `Gpu` compiles it once for the device at hand, keeps the machine code in the cache of kernels,
-and hands over arguments as the code takes them, field by field (`flattened`). `Simulator` runs the Python function, a
-thread at a time, where NUMBA_ENABLE_CUDASIM=1.
+A function takes the number of its thread and how many threads there are, then its arguments: numbers, arrays and named
+tuples of them. `Gpu` compiles it once for the device at hand, keeps the machine code in the cache of kernels, and
+passes arguments as the code takes them, field by field (`flattened`). `Simulator` runs the Python function, a thread at
+a time, where NUMBA_ENABLE_CUDASIM=1.
 """
 
 import hashlib

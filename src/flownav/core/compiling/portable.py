@@ -243,7 +243,7 @@ class Loaded:
         self._engine.finalize_object()
 
     def function(self, symbol: str, pointers: int) -> Any:
-        """What Python calls, on addresses."""
+        """The function that Python calls, on addresses."""
         kind = ctypes.CFUNCTYPE(ctypes.c_int32, *[ctypes.c_void_p] * pointers)
         return kind(self._engine.get_function_address(symbol))
 

@@ -31,7 +31,7 @@ class OnLanes(Protocol):
 
 
 class _Kept(NamedTuple):
-    """How a record is loaded and stored. told: what its access is told, which of several it is perhaps; buffer: the
+    """How a record is loaded and stored. told: arguments of its access, such as which of several it is; buffer: the
     name of the lane buffer in which it lies.
     """
 
@@ -42,7 +42,7 @@ class _Kept(NamedTuple):
 
 
 class _Sink(NamedTuple):
-    """A procedure that takes a record of one lane, and what it must be told besides."""
+    """A procedure that takes a record of one lane, and the further arguments that it needs."""
 
     take: Callable[..., Any]
     needs: tuple[str, ...]
@@ -65,7 +65,7 @@ class Layout:
         return first
 
     def keep(self, record: Any, count: int = 1, index: str = "") -> int:
-        """The first of new rows for a record, or for `count` of them, told apart by a number of the name `index`.
+        """The first of new rows for a record, or for `count` of them, distinguished by a number of the name `index`.
 
         Before anything is stored a field has its default, or 0.
         """
@@ -88,7 +88,9 @@ class Layout:
         self._kept[record] = _Kept(found, None, told)
 
     def see(self, law: Callable[..., Any]) -> None:
-        """A record that is not stored: what a law returns of other records of this layout, and of what it is told."""
+        """A record that is not stored: the result of a law of other records of this layout, and of the law's
+        arguments.
+        """
         plan = _Plan(self, law)
         passed = plan.passed(law)
         source = f"def found({', '.join(['work', 'lanes', *plan.told, 'lane'])}):\n    return law({passed})\n"
@@ -128,7 +130,7 @@ class Layout:
         """A function of one lane's records made a procedure on all lanes.
 
         Its positional parameters are annotated with records of this layout, or with named tuples of them; its
-        keyword-only ones are told by the caller, the same for all lanes, as are an index and what sinks need:
+        keyword-only ones are passed by the caller, the same for all lanes, as are an index and the arguments of sinks:
         `run(work, lanes, t_s, *others, o)`, the others as the function has them, then other buffers and indices. It
         returns a record, or a tuple or a named tuple of records, of truths and of such tuples.
         """
@@ -160,7 +162,7 @@ def _several(record: Any, first: int) -> tuple[Callable[..., Any], Callable[...,
 
 # -- from annotations to source -------------------------------------------------------------------------------
 class _Plan:
-    """The source of one generated loop, as it grows: what it is told, and what its text names."""
+    """The source of one generated loop, as it grows: its arguments, and the names in its text."""
 
     def __init__(self, layout: Layout, function: Callable[..., Any]) -> None:
         self.layout, self.name = layout, function.__name__
@@ -169,7 +171,7 @@ class _Plan:
         self.truths: list[str] = []
 
     def also(self, names: tuple[str, ...]) -> str:
-        """These names among what the loop is told; as arguments of a call, each followed by a comma."""
+        """Add these names to the loop's arguments; return them as arguments of a call, each followed by a comma."""
         self.told += [name for name in names if name not in self.told]
         return "".join(f"{name}, " for name in names)
 
@@ -188,7 +190,7 @@ class _Plan:
         return f"{self.known(kept.load)}({self.place(kept)})"
 
     def passed(self, function: Callable[..., Any]) -> str:
-        """What the law is called with, in one lane."""
+        """Arguments of the law's call, in one lane."""
         kinds = get_type_hints(function)
         return ", ".join(
             p.name if p.kind is p.KEYWORD_ONLY else self.loaded(kinds[p.name], p.name) for p in parameters(function)

@@ -1,4 +1,4 @@
-"""What machine code is made for, and how: a processor level, and one optimisation instead of one per function.
+"""Target of machine code: a processor level, and one optimisation instead of one per function.
 
 Numba optimises every function it compiles and emits machine code for it, and does both again in each caller. For the
 functions that only kernels call this is waste. Inside `lean()`

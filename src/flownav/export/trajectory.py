@@ -1,4 +1,5 @@
-"""What writers take of a record: paths as poses, the estimate's error, whole numbers of time, tables as a folder.
+"""A record's contents as writers take them: paths as poses, the estimate's error, whole numbers of time, tables as a
+folder.
 
 Poses stand in NED/FRD or in ENU/FLU; the error, where the record holds a truth. Tables are Parquet or CSV files beside
 the manifest.json.
@@ -50,7 +51,7 @@ class Trajectory(NamedTuple):
 
     @property
     def notes(self) -> Iterator[str]:
-        """What a user should know of this path, one line each."""
+        """Notes on this path for the user, one line each."""
         if self.left_out:
             yield f"{self.name}: {self.left_out} of {self.left_out + len(self.t_s)} rows left out, not finite"
         if not self.oriented:

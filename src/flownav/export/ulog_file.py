@@ -164,7 +164,7 @@ def _number(log: bytes, found: ulog.Found, at: int) -> int:
 
 # -- the file -----------------------------------------------------------------------------------------------
 class Contents(NamedTuple):
-    """What goes into a log: topics, logged strings, texts about the whole log, and notes for the user."""
+    """Contents of a log: topics, logged strings, texts about the whole log, and notes for the user."""
 
     topics: list[ulog.Topic]
     strings: list[ulog.Stamped]
@@ -215,7 +215,7 @@ def _all_of(record: Record) -> Contents:
 
 
 def _ours(record: Record, shift_s: float) -> Contents:
-    """What only flownav can say: paths, innovations, events."""
+    """Contents that only flownav has: paths, innovations, events."""
     paths = trajectories(record)
     notes = [note for path in paths for note in path._replace(oriented=True).notes]  # nothing stands in here
     for name, table in record.tables.items():
@@ -233,7 +233,7 @@ def _ours(record: Record, shift_s: float) -> Contents:
 
 
 def _clock_start_s(record: Record, original: Path) -> float:
-    """What the original's clock showed at time 0 of the record."""
+    """Time of the original's clock at time 0 of the record [s]. InputError where the record does not state it."""
     start_s = record.manifest.get("clock_start_s")
     if start_s is None:
         raise InputError(

@@ -13,7 +13,7 @@ from flownav.navigation.rows import EVENT_COLUMNS, INNOVATION_COLUMNS
 
 
 class Outcome(NamedTuple):
-    """What became of a call: the numbers of `onboard.OutcomeHead`, and rows of innovations and of events."""
+    """Outcome of a call: the numbers of `onboard.OutcomeHead`, and rows of innovations and of events."""
 
     head: onboard.OutcomeHead[float]
     innovation: Array

@@ -60,12 +60,12 @@ class Object(NamedTuple):
 
     @property
     def exported(self) -> list[Symbol]:
-        """What callers see."""
+        """Symbols that callers see."""
         return [symbol for symbol in self.symbols if symbol.binding == 1 and symbol.section]
 
     @property
     def missing(self) -> list[str]:
-        """What it names and does not hold."""
+        """Names of symbols that it uses and does not contain."""
         return [symbol.name for symbol in self.symbols if symbol.name and not symbol.section]
 
     @property

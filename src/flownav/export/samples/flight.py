@@ -37,7 +37,7 @@ LINK_S = 0.004  # from the vehicle to the ground station
 
 @lru_cache(maxsize=2)
 def sample_log(seed: int) -> Log:
-    """What the vehicle of the sample flight logged: streams at their arrival, the truth, the estimate it flew on."""
+    """The log of the sample flight: streams at their arrival, the truth, and the estimate that the autopilot used."""
     setup = assemble(load_scenario(str(shipped(SCENARIO))))
     return replace(log_of(fly_recorded(setup, seed), setup), origin_deg_m=ORIGIN_DEG_M)
 

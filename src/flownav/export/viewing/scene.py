@@ -1,6 +1,6 @@
 """The flight in space, in Rerun's words. Needs the package rerun-sdk.
 
-Frames: `/enu` (east, north, up: right-handed, z up, what Rerun's view is told) > `/enu/ned` > everything else, so that
+Frames: `/enu` (east, north, up: right-handed, z up, the axes of Rerun's view) > `/enu/ned` > everything else, so that
 every position stands in the file as the record has it, in NED metres, and body axes are forward-right-down.
 """
 

@@ -1,7 +1,7 @@
-"""What is drawn in space: the vehicle and its cameras as outlines in body axes (FRD) [m], the flow as a velocity.
+"""Shapes drawn in space: the vehicle and its cameras as outlines in body axes (FRD) [m], the flow as a velocity.
 
-What the record does not say (a replayed log knows nothing of the airframe) is drawn as a small cross of axes and
-nothing more: no size is made up. The flow's velocity is flow less the sensor's own turning, times the range.
+Where the record does not describe the airframe (a replayed log does not), a small cross of axes is drawn and nothing
+more: no size is made up. The flow's velocity is flow less the sensor's own turning, times the range.
 """
 
 import math

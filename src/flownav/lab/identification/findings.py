@@ -1,4 +1,4 @@
-"""What an identification found, whatever kind of log it came from: the one bundle that file, JSON and table read."""
+"""Findings of an identification, whatever kind of log it came from: the one bundle that file, JSON and table read."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -105,7 +105,7 @@ class Findings:
 
     @property
     def gyro_verdict(self) -> str:
-        """What the sensor's own gyro shows to be wrong, in words; "" where nothing is."""
+        """Verdict on the sensor's own gyro, in words; "" where nothing is wrong."""
         return "" if self.own_gyro is None else self.own_gyro.sentence(abs(self.gain.value))
 
     @property

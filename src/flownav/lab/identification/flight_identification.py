@@ -111,7 +111,7 @@ def _check_alike(flown: Flight, moved: Motion) -> None:
     if best < LEAST_LIKENESS:
         raise InputError(
             f"{flown.name}: the flow does not follow the reference ({flown.reference_name}; their velocities' "
-            f"correlation is {best:.2f}, {LEAST_LIKENESS:g} is needed): no scale can be told; `flownav info` shows "
+            f"correlation is {best:.2f}, {LEAST_LIKENESS:g} is needed): no scale can be found; `flownav info` shows "
             "range, quality and clock"
         )
 
@@ -211,7 +211,7 @@ def _axis_run(flown: Flight, moved: Motion, velocity: Array, axis: int) -> Exper
 def _dynamic_runs(
     flown: Flight, moved: Motion, velocity: Array, runs: Sequence[Experiment]
 ) -> Sequence[Sequence[Experiment]]:
-    """What shows the dynamics of x and of y: above 1/SPLIT_S the IMU where it serves, else the reference."""
+    """Experiments for the dynamics of x and of y: above 1/SPLIT_S of the IMU where it serves, else of the reference."""
     if moved.fast_m_s is None or moved.flow_tie is None or moved.flow_tie.likeness < CLEAR_LIKENESS:
         return [[run] for run in runs]
     other = fast_flow(flown, moved.t_s, velocity)

@@ -46,7 +46,7 @@ class OwnGyro(NamedTuple):
         return self.told and (self.slope.high < low or self.slope.low > high)
 
     def sentence(self, gain: float | None) -> str:
-        """What is wrong, in words; "" where nothing is. gain: the flow's own over the true one, None where unknown."""
+        """Verdict in words; "" where nothing is wrong. gain: the flow's own over the true one, None where unknown."""
         if not self.is_off:
             return ""
         slope, low, high = self.slope

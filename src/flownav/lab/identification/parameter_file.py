@@ -32,7 +32,7 @@ class Parameter(NamedTuple):
 
 
 def within(name: str, wanted: float, low: float, high: float, kind: int, reason: str) -> Parameter:
-    """A parameter whose range is low to high: a value that it cuts is said."""
+    """A parameter within its range low to high; where a value is cut, the reason states it."""
     held = min(max(wanted, low), high)
     if held == wanted:
         return Parameter(name, wanted, kind, reason)

@@ -130,7 +130,7 @@ def _doubts(findings: Findings, axis: str) -> Iterator[str]:
 
 
 def _response_along(findings: Findings, axis: str) -> Response | None:
-    """What shows an axis's gain: of a rig, which moves along one axis, the best of all heights."""
+    """Response that shows an axis's gain: of a rig, which moves along one axis, the best of all heights."""
     along = [response for response in findings.responses if response.axis == axis]
     if not along:
         return None

@@ -47,7 +47,7 @@ class Camera(NamedTuple):
 
 
 class Exposure(NamedTuple):
-    """What automatic exposure settled on: time [s], gain, and the grey level of a perfectly white pad."""
+    """Result of automatic exposure: time [s], gain, and the grey level of a perfectly white pad."""
 
     time_s: float
     gain: float

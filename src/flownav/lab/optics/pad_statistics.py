@@ -1,4 +1,5 @@
-"""What frames of many flights say of a pad detector: rates, noise and bias by height and speed, and laws of them.
+"""Statistics of a pad detector over frames of many flights: rates, noise and bias by height and speed, and laws of
+them.
 
 **Bias** lasts as long as a flight: of the boresight (two angles), of the scale of angles (a focal length that is
 believed too long shows them too small), of the distance. **Noise** is what is left within the flights,
@@ -6,9 +7,9 @@ believed too long shows them too small), of the distance. **Noise** is what is l
     sigma^2 = floor^2 + (per_m r)^2 + (per_rad_s w)^2,
 
 r the reach (the distance squared over the height: from there a level pad looks as small straight above it) and w the
-rate at which the ground straight below passes: the detector's own, what few pixels tell, and what moves while the rows
-are exposed one after the other. **Missed** are a share `hidden` of each flight's frames,
-whatever it does (what lies on the pad, glare), and of the rest those of a probit in r and w.
+rate at which the ground straight below passes: the detector's own, the resolution of few pixels, and the motion while
+the rows are exposed one after the other. **Missed** are a share `hidden` of each flight's frames, whatever it does
+(objects on the pad, glare), and of the rest those of a probit in r and w.
 """
 
 from collections import Counter
@@ -90,7 +91,7 @@ class PadLaws(NamedTuple):
 
 
 class FlightBias(NamedTuple):
-    """What lasts in one flight: two angles, the scale of angles (as a focal length too long), the distance's."""
+    """Errors that last for one flight: two angles, the scale of angles (as a focal length too long), the distance's."""
 
     forward_rad: float
     right_rad: float
@@ -214,7 +215,7 @@ def missed_law(c: dict[str, Array], max_height_m: float) -> MissedLaw:
 
 
 def hidden_shares(missed: Array, counts: Array) -> Array:
-    """What a flight misses of its easy frames beyond what the median flight does, as a part of the rest of them.
+    """Share of its easy frames that a flight misses beyond the median flight's share, as a part of the rest of them.
 
     None where the median flight might miss as many by chance once in a hundred flights.
     """

@@ -72,7 +72,7 @@ class RigSettings:
 
 @dataclass(frozen=True)
 class RigLog:
-    """What the board logged in one run, one row every LOG_S; the columns of rig.csv."""
+    """Log of the board in one run, one row every LOG_S; the columns of rig.csv."""
 
     time_s: Array
     encoder_counts: NDArray[np.int64]

@@ -77,7 +77,7 @@ def _check(horizon_s: float, imu_hz: float | None, others_hz: float | None) -> N
 
 
 def _rates(flight: "Flight", horizon_s: float, imu_hz: float | None = None, others_hz: float | None = None) -> "Rates":
-    """What there must be room for: what is asked for, else what the flight has."""
+    """Capacity of the rings: the rates that are asked for, else those of the flight."""
     from flownav.export.onboard.package import rates_of
 
     found = rates_of(flight.segment, horizon_s)
@@ -152,7 +152,7 @@ def verify(what: str | Path, record: str | Path | None = None, *, horizon_s: flo
 
 
 def _told(what: str, found: "Found", changed: list[str]) -> dict[str, Any]:
-    """What came of a comparison, as facts."""
+    """Facts of a comparison, as a dictionary."""
     facts = found._asdict()
     equal_digests = facts.pop("equal")
     return {

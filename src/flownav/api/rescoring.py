@@ -132,7 +132,7 @@ def _missing(names: tuple[str, ...], columns: Mapping[str, Array]) -> str:
 # tables that our filter wrote, or that lie in the frame of its estimate
 OURS = ("states", "innovation", "consistency", "smoothed", "flown", "fed", "autopilot", "estimate")
 KINDS = ("fly", "replay")
-WHOLE_SHARE = 0.99  # of the instants that are scored: an estimate that covers less is said to
+WHOLE_SHARE = 0.99  # of the instants that are scored: an estimate that covers less is reported
 
 
 def rescored(record: Record, estimate: object, name: str, *, from_handover: bool) -> Record:
@@ -184,14 +184,14 @@ def _span(record: Record) -> tuple[float, float]:
 
 
 def _from_handover(record: Record, columns: dict[str, Array]) -> dict[str, Array]:
-    """The estimate less its error in place at the last instant before the flight was handed over to the filter."""
+    """The estimate less its error in place at the last instant before the flight's handover to the filter."""
     facts, truth = record.manifest.get("judging") or {}, record.tables.get("truth")
     if "handover_s" not in facts or truth is None:
-        raise InputError("from_handover: only a simulated flight is handed over; leave it out")
+        raise InputError("from_handover: only a simulated flight has a handover; leave it out")
     before = np.flatnonzero(np.asarray(truth["t_s"], float) < facts["handover_s"])
     row = before[-1:] if len(before) else np.zeros(1, int)
     t_s = np.asarray(truth["t_s"], float)[row]
     error = at_instants(columns, POSITION_NED, t_s)[0] - columns_of(truth, POSITION_NED)[row[0]]
     if not np.isfinite(error).all():
-        raise InputError(f"from_handover: the estimate says nothing at {t_s[0]:g} s, when the flight is handed over")
+        raise InputError(f"from_handover: the estimate has no values at {t_s[0]:g} s, the instant of the handover")
     return {**columns, **{name: columns[name] - error[i] for i, name in enumerate(POSITION_NED)}}

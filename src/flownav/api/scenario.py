@@ -21,7 +21,8 @@ WORDS = {"gps": "model", "filter": "name", "vehicle": "file", "autopilot": "feed
 
 
 class Scenario:
-    """What is flown: path, vehicle, sensors, wind, filter and autopilot, as docs/reference/scenarios.md has them.
+    """The flight to be flown: path, vehicle, sensors, wind, filter and autopilot, as docs/reference/scenarios.md has
+    them.
 
     file: the checked scenario file; its tables are attributes of it. A Scenario never changes; `changed` makes another.
 
@@ -61,7 +62,7 @@ class Scenario:
 
     @property
     def description(self) -> str:
-        """What the file says of itself, one line.
+        """The file's own description, one line.
 
         Example:
             >>> "land" in flownav.Scenario.load("landing").description

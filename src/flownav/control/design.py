@@ -89,7 +89,7 @@ SLOP_UNSURE = 0.3  # standard deviation of the dead band, a share: half of what 
 
 
 def told_before(vehicle: VehicleParameters, hover: Trim, begins: int) -> Told:
-    """What is believed of a helicopter before it is learnt in hover; begins: the epoch of the stir, below 0: never."""
+    """Beliefs about a helicopter before it is learnt in hover; begins: the epoch of the stir, below 0: never."""
     spring = vehicle.hub_stiffness_n_m_rad + vehicle.hub_above_cg_m * hover.thrust_n
     inflow, tip = hover.induced_velocity_m_s, vehicle.main_tip_speed_m_s
     back = vehicle.flap_response * rotor.blowback(

@@ -34,7 +34,7 @@ from flownav.estimation.states import (
 
 # what each hypothesis is, and its unit
 FLOW_SCALE = 0  # flow too large; 1: twice
-FLOW_AGE = 1  # flow older than said [s]
+FLOW_AGE = 1  # flow older than stated [s]
 RANGE_OFFSET = 2  # range too long [m]
 GPS_DRIFT = 3  # 3: GPS position drifts off north, east, down [m/s]
 HEADING_OFF = 6  # what is read as heading, too large [rad]
@@ -53,7 +53,7 @@ NAMES = (
 
 
 class Size(NamedTuple):
-    """What is known of a fault's size: estimate, standard deviation, and (estimate / standard deviation) squared."""
+    """Estimate of a fault's size: estimate, standard deviation, and (estimate / standard deviation) squared."""
 
     size: float
     sigma: float
@@ -75,7 +75,7 @@ def followed(work: Work, lanes: Lanes) -> int:
 
 @equation
 def size_told(work: Work, lanes: Lanes, fault: int, lane: int, prior_sigma: float) -> Size:
-    """What innovations tell of a fault's size in a lane."""
+    """Size of a fault in a lane by its innovations."""
     information, score = work[(INFORMATION + fault) * len(lanes) + lane], work[(SCORE + fault) * len(lanes) + lane]
     return size_of(information, score, prior_sigma)
 
@@ -100,7 +100,9 @@ def hold_unlearnt(work: Work, lanes: Lanes, n: int) -> None:
 
 @procedure
 def weigh(work: Work, lanes: Lanes, n: int, color: float) -> None:
-    """What the innovation that was just fused tells of each fault; color: how many readings err alike, in effect."""
+    """Add the information of the innovation that was just fused to each fault; color: number of readings that err
+    alike, in effect.
+    """
     for k in range(followed(work, lanes)):
         for lane in range(len(lanes)):
             fused = work[ACCEPTED * len(lanes) + lane] > 0.0
@@ -115,7 +117,7 @@ def weigh(work: Work, lanes: Lanes, n: int, color: float) -> None:
 
 @procedure
 def fade(work: Work, lanes: Lanes, factor: float) -> None:
-    """What was told long ago is told of another fault: J <- factor J, d <- factor d."""
+    """Forget old information, which may be of another fault: J <- factor J, d <- factor d."""
     for k in range(followed(work, lanes)):
         for lane in range(len(lanes)):
             work[(INFORMATION + k) * len(lanes) + lane] *= factor
@@ -124,7 +126,7 @@ def fade(work: Work, lanes: Lanes, factor: float) -> None:
 
 @procedure
 def leave_lane(work: Work, lanes: Lanes, n: int, fault: int, lane: int, size: float) -> None:
-    """What a fault of this size has done stays when it is over: s_left <- s_left + s b."""
+    """Keep the effect of a fault of this size when it is over: s_left <- s_left + s b."""
     for i in range(n):
         work[at(i, n + LEFT) * len(lanes) + lane] += size * work[at(i, n + fault) * len(lanes) + lane]
 

@@ -84,7 +84,7 @@ def step(function: Callable[..., Any]) -> Step:
 
 # -- from names to source -----------------------------------------------------------------------------------
 class Parameter(NamedTuple):
-    """What a law takes by one name: a number, or a record of numbers that have names of their own."""
+    """A law's parameter of one name: a number, or a record of numbers that have names of their own."""
 
     name: str
     record: Any = None
@@ -150,7 +150,7 @@ def at(row: int | str) -> str:
 
 
 def value_of(name: str) -> str:
-    """What a law's parameter of this name is given."""
+    """Source text of the value of a law's parameter of this name."""
     if name == "axis":
         return "axis"
     if name in VECTOR_ROWS:

@@ -1,4 +1,4 @@
-"""What laws are told, as records: their fields are names of states and rows, or of numbers that a caller passes."""
+"""Arguments of laws, as records: their fields are names of states and rows, or of numbers that a caller passes."""
 
 from typing import NamedTuple
 
@@ -40,7 +40,7 @@ class Tilt(NamedTuple):
 
 
 class Inertial(NamedTuple):
-    """What the IMU reads, body FRD: body rate [rad/s] and specific force [m/s2]."""
+    """Reading of the IMU, body FRD: body rate [rad/s] and specific force [m/s2]."""
 
     gyro_x: float
     gyro_y: float

@@ -70,7 +70,9 @@ def back_over_prediction(vector: Array, matrix: Array, dt_s: float, middle: Arra
 
 @kernel
 def decay_factors(dt_s: float, settings: FilterSettings) -> Array:
-    """What `error_models.propagate_gauss_markov` multiplies each state by, (STATES,): less than 1 for such errors."""
+    """Factors by which `error_models.propagate_gauss_markov` multiplies each state, (STATES,): less than 1 for such
+    errors.
+    """
     factor = np.ones(STATES)
     for i in range(3):
         factor[GPS_SLOW + i] = exp(-dt_s / settings.gps_slow_tau_s)
@@ -115,7 +117,7 @@ def back_over_correction(
 
 @kernel
 def back_over_reset(vector: Array, matrix: Array, state: int) -> None:
-    """A state that was forgotten: nothing that follows tells of what it was before."""
+    """A state that was forgotten: later readings carry no information on its value before."""
     vector[state] = 0.0
     for i in range(STATES):
         matrix[state, i] = matrix[i, state] = 0.0

@@ -117,8 +117,8 @@ GYRO_SHARE = _rows.take(1)  # by how much the gyro's bias is in a flow reading w
 HYPOTHESES = _rows.take(1)  # in the first lane: how many faults are followed
 SIGNATURE = _rows.take(MOST_HYPOTHESES)  # what one unit of each adds to the reading at hand
 SHARE = _rows.take(MOST_HYPOTHESES)  # how much of the state's error the reading shows while the fault is there
-INFORMATION = _rows.take(MOST_HYPOTHESES)  # what innovations tell of its size [1 / its unit squared]
-SCORE = _rows.take(MOST_HYPOTHESES)  # that information times the size that they tell
+INFORMATION = _rows.take(MOST_HYPOTHESES)  # information of innovations on its size [1 / its unit squared]
+SCORE = _rows.take(MOST_HYPOTHESES)  # that information times the size that they show
 # within a step; beside the states stand the hypotheses
 SCRATCH = _rows.take(max(MOST_SOURCES * MOST_SOURCES, 3 * COLUMNS))  # a transition's own block of P, both triangles
 # and a correction's columns, in the same rows: none is done within the other

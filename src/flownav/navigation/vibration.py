@@ -24,7 +24,7 @@ BLOCK_S, BLOCKS_FOLLOWED_S = 0.4, 4.0
 FOLLOWING_S = 1.0  # over which readings' scatter is followed (test_judges)
 DOUBT_M_S2 = 2.0  # of an accelerometer that the range contradicts
 DOUBT_LASTS_S = 60.0
-FREED_WALK_M_S2_RT_S = 0.02  # of a bias, for each time that the accelerometer is noisier than told
+FREED_WALK_M_S2_RT_S = 0.02  # of a bias, for each time that the accelerometer is noisier than stated
 with_doubt = replacing(ImuMemory, "doubt_m_s2")
 with_shaking = replacing(ImuMemory, "doubt_m_s2", "shaken_most")
 # TWICE as much as before, and another vibration has begun, as when rotors spin up; one that has ended is forgotten

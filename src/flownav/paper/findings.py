@@ -1,4 +1,4 @@
-"""What the reproduction says of the paper's claims, each sentence and verdict computed from the numbers.
+"""Findings of the reproduction on the paper's claims, each sentence and verdict computed from the numbers.
 
 Those marked `decides` make the command's exit status 1 where they do not agree.
 """
@@ -45,7 +45,7 @@ class Finding(NamedTuple):
         return "agrees" if self.agrees else "differs"
 
     def as_json(self) -> dict[str, object]:
-        """What the command prints."""
+        """The finding as the command prints it."""
         return {name: value for name, value in self._asdict().items() if name != "decides"}
 
 

@@ -72,7 +72,7 @@ class OrderTest:
 
 
 class Identified(NamedTuple):
-    """What one run with another set-up is identified as: fit [%], gain a/c, delay b/c [s]."""
+    """Identification of one run with another set-up: fit [%], gain a/c, delay b/c [s]."""
 
     fit_percent: float
     gain: float

@@ -19,7 +19,7 @@ FLIGHT_TABLES = (5, 6)
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What was reproduced; what was not asked for is None or empty."""
+    """Results of the reproduction; a table that was not asked for is None or empty."""
 
     tables: tuple[int, ...]
     seed: int

@@ -61,7 +61,7 @@ class FlowCameraParameters(NamedTuple):
 
 
 class FlowCameraTruth(NamedTuple):
-    """What the camera looks at and how it moves: the lens's velocity after the dynamics and body rates, body FRD.
+    """View and motion of the flow camera: the lens's velocity after the dynamics and body rates, body FRD.
 
     range_m: along the boresight. height_m: of the lens. texture: 0 (none) to 1.
     """

@@ -31,7 +31,7 @@ AnyState = HelicopterState | MultirotorState
 
 
 class RotorFacts(NamedTuple):
-    """What the sensors feel of the rotors: speed in hover [rad/s], radius, height above the centre of gravity [m]."""
+    """Facts of the rotors that sensors feel: speed in hover [rad/s], radius, height above the centre of gravity [m]."""
 
     speed_rad_s: float
     radius_m: float

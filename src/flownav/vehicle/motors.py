@@ -88,7 +88,7 @@ def battery_voltage(power_w: float, used_as: float, vehicle: MultirotorParameter
 
 @equation
 def root_of_share(share: float) -> float:
-    """What a share of the full thrust is as a share of the full speed."""
+    """Share of the full speed that gives a share of the full thrust."""
     root: float = np.sqrt(larger(share, LEAST_SHARE))
     return root
 

@@ -215,7 +215,7 @@ def derivative(
 
 @equation
 def outputs(state: MultirotorState, around: Around, hexa: bool, vehicle: MultirotorParameters) -> Outputs:
-    """What the state implies: all rotors' thrust in ground effect, torque on the body, shaft power; feet's force."""
+    """Outputs of the state: all rotors' thrust in ground effect, torque on the body, shaft power; feet's force."""
     rotation = airframe.attitude(state)
     down = (rotation[6], rotation[7], rotation[8])
     air = airframe.air_motion(state, rotation, around)

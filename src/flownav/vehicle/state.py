@@ -73,7 +73,7 @@ class RotorLoads(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """What the state implies: main rotor thrust in ground effect, torque, shaft power, inflow; skid normal force."""
+    """Outputs of a state: main rotor thrust in ground effect, torque, shaft power, inflow; skid normal force."""
 
     thrust_n: float
     torque_n_m: float

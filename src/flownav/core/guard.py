@@ -106,7 +106,9 @@ def object_in(path: Path, advice: str, most: int = MOST_JSON_BYTES) -> dict[str,
 
 
 def inputs_there(paths: Iterable[Path], what: str) -> None:
-    """InputError where a file or folder that is to be read is missing, or cannot be read; `what` says what is taken."""
+    """InputError where a file or folder that is to be read is missing, or cannot be read; `what` names the kind of
+    input.
+    """
     for path in paths:
         if not an_input(path).exists():
             raise InputError(f"{path}: no such file or folder; {what}")

@@ -66,7 +66,7 @@ def _digest(entries: dict[str, Any]) -> str:
 
 
 def is_ours(path: Path) -> bool:
-    """Whether flownav wrote a file, as it is, and can write it again: nothing is lost that somebody made, or flew."""
+    """Whether flownav wrote a file, as it is, and can write it again: no file that a user made, or flew, is lost."""
     try:
         with path.open("rb") as file:
             head = file.read(LOOKED_AT_BYTES)

@@ -51,16 +51,16 @@ RATES = ("rate_p_rad_s", "rate_q_rad_s", "rate_r_rad_s")
 TABLES: dict[str, tuple[str, ...]] = {
     # what was so (simulation, motion capture)
     "truth": (*STATE, *RATES, "thrust_n", "on_ground"),
-    # what the filter says, with one standard deviation of each, and how far off it may be if a sensor fails unseen
+    # the filter's estimate, with one standard deviation of each, and how far off it may be if a sensor fails unseen
     "estimate": (*STATE, *STANDARD_DEVIATIONS, *PROTECTION_LEVELS),
     # where the truth is known: the error squared of position and velocity over what the filter states (NEES)
     "consistency": ("nees",),
-    # the rest of what it says, at the same instants: velocity in the earth's axes, standard deviations of the attitude,
+    # the rest of its state, at the same instants: velocity in the earth's axes, standard deviations of the attitude,
     # and every other state with its own
     "states": (
         *VELOCITY_NED, *(f"std_{name}" for name in TILTS), *FILTER_STATES, *(f"std_{name}" for name in FILTER_STATES),
     ),
-    # what the filter says once it has seen the whole flight
+    # the filter's estimate from the whole flight
     "smoothed": (*STATE, *STANDARD_DEVIATIONS),
     # the estimate of another estimator (an autopilot's own)
     "autopilot": STATE,

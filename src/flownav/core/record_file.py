@@ -72,7 +72,7 @@ class Manifest(BaseModel):
 
 
 def save(manifest: dict[str, Any], tables: Tables, path: Path, *, replacing: bool = False) -> None:
-    """Write a record as one file, whole or not at all; as `Record.save` says. The same record is the same bytes."""
+    """Write a record as one file, whole or not at all; as in `Record.save`. The same record is the same bytes."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

@@ -28,7 +28,7 @@ ALIKE_RAD = 0.6  # between the two witnesses: 34 deg
 LEAST_PUSH_M_S = 0.6  # root sum square of the changes; the difference of two GPS velocities has 0.57 of noise
 LEAST_LIKENESS = 0.6  # not measured
 FADING_S = 20.0  # not measured
-ONCE_MORE_M = 1.0  # of travel tells the heading again: within 8 deg in the same test
+ONCE_MORE_M = 1.0  # of travel determines the heading again: within 8 deg in the same test
 FREED_TILT_RAD = 0.1  # what a compass that pulled may have done; not measured
 FREED_ACCEL_M_S2 = 0.5  # not measured
 
@@ -67,14 +67,14 @@ def faded(t_s: float, m: CourseMemory) -> CourseMemory:
 
 @equation
 def judge_push(m: PushMemory) -> tuple[bool, float]:
-    """Whether the accelerometer says how the heading errs, and by how much: true less own [rad]."""
+    """Whether the accelerometer shows an error of the heading, and how large: true less own [rad]."""
     likeness, error_rad = turn_between(m.along, m.across, m.gps * m.own)
     return m.gps >= LEAST_PUSH_M_S * LEAST_PUSH_M_S and likeness >= LEAST_LIKENESS, error_rad
 
 
 @equation
 def refuted(course: CourseMemory, push: PushMemory) -> tuple[bool, float]:
-    """Whether both witnesses say that the heading is wrong by a large angle, and that by the flow [rad]."""
+    """Whether both witnesses show that the heading is wrong by a large angle, and the angle by the flow [rad]."""
     flow_knows, by_flow = judge_course(course)
     own_knows, by_own = judge_push(push)
     apart = within_half_turn(by_flow - by_own)

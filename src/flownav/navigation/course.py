@@ -1,9 +1,9 @@
 """A heading that no sensor reads, found from the course: the flow's velocity turned onto that of GPS.
 
 As complex numbers, north + i east, the flow's velocity w by the filter's own heading and GPS velocity v differ by the
-heading's error: v = w exp(i error). The sum of v conj(w) over the way has the error as its angle, whatever it is;
-a Kalman filter, which takes errors for small, would lose itself where it is large. Until it is found nothing corrects
-the heading (`take.consider_datum`), and the flow, by whose variance so large a doubt counts, tells little.
+heading's error: v = w exp(i error). The sum of v conj(w) over the way has the error as its angle, whatever it is; a
+Kalman filter, which takes errors for small, would lose itself where it is large. Until it is found nothing corrects the
+heading (`take.consider_datum`), and the flow, by whose variance so large a doubt counts, gives little information.
 """
 
 from typing import NamedTuple
@@ -71,7 +71,7 @@ def turn_between(along: float, across: float, power: float) -> tuple[float, floa
 
 @equation
 def judge_course(m: CourseMemory) -> tuple[bool, float]:
-    """Whether the way says how the heading errs, and by how much: true less own [rad]."""
+    """Whether the course shows an error of the heading, and how large: true less own [rad]."""
     likeness, error_rad = turn_between(m.along, m.across, m.gps * m.flow)
     return m.travel_m >= LEAST_TRAVEL_M and likeness >= LEAST_LIKENESS, error_rad
 
@@ -129,7 +129,9 @@ class FoundHeading(NamedTuple):
 def find_heading(
     reading: Reading, heading: HeadingMemory, own: Attitude, m: CourseMemory, *, t_s: float
 ) -> FoundHeading:
-    """At a GPS velocity: where the way says how the heading errs, the heading and the velocity are turned by it."""
+    """At a GPS velocity: where the course shows an error of the heading, the heading and the velocity are turned by
+    it.
+    """
     counts = heading.sought > 0.0 and is_velocity(reading)
     after = with_gps(reading, t_s, m)
     knows, error_rad = judge_course(after)

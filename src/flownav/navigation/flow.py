@@ -142,7 +142,7 @@ class Freed(NamedTuple):
 def free_velocity(
     tested: Tested, look: Look, gps: GpsMemory, before: FlowInnovation, m: FlowMemory, *, t_s: float, angular: bool
 ) -> Freed:
-    """Flow that is refused again and again, and nothing else tells the velocity: then that is what is wrong."""
+    """Flow that is refused again and again, and no other sensor measures the velocity: then that is what is wrong."""
     refused = tested.reason == INNOVATION_GATE
     again = tested.innovation * before.innovation > 0.0  # spikes are not alike
     freed = refused and m.ratio > DOUBTED_RATIO and not holds(gps, t_s) and again
@@ -177,7 +177,7 @@ class Agreement(NamedTuple):
 
 @on_lanes
 def judge_agreement(look: Look, reading: Reading, m: FlowMemory, *, t_s: float) -> Agreement:
-    """Say that flow is doubted, and that it is trusted again; note when it was tested last. No other is held back."""
+    """Write the event that flow is doubted, or trusted again; note when it was tested last. No other is held back."""
     if look.reason != FUSED:
         return Agreement(HeldBack(0.0), m, NO_EVENT)
     doubted = lasting_doubt(m.doubted, m.ratio)

@@ -94,7 +94,7 @@ def turning_of(
     """The turning that the flow saw [rad/s]: its own gyro less its bias, or the vehicle's IMU over the exposure.
 
     bias_x, bias_y: the filter's gyro bias, which the IMU's mean has. A sensor's own gyro is followed against the IMU,
-    but not where it has no data: it may say zero then for its gyro too.
+    but not where it has no data: it may report zero then for its gyro too.
     """
     imu_x, imu_y = reading.value_4 - bias_x, reading.value_5 - bias_y
     own_x, own_y = reading.value_2, reading.value_3
@@ -117,7 +117,7 @@ def turning_of(
 def see_ground(
     below: GroundBelow, ranged: RangeMemory, echo: EchoMemory, ground: GroundMemory, *, t_s: float, s: FlowSettings
 ) -> Look:
-    """The ground that the lens sees, and whether a range tells the height over it; the rest is not known yet."""
+    """The ground that the lens sees, and whether a range measures the height over it; the rest is not known yet."""
     range_m = lens_range(below.rotation, below.height_m, (0.0, 0.0, s.flow_below_m))[0]
     spread_m = np.sqrt(larger(below.variance, 0.0))
     known = ground.known > 0.0 and spread_m <= LARGEST_SPREAD * range_m

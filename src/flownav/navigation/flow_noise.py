@@ -1,5 +1,5 @@
-"""The noise of a flow reading: what the sensor file or the settings say of what the sensor reports, and what the
-innovations show, as a factor.
+"""The noise of a flow reading: the noise of the sensor's reports by the sensor file or the settings, and a factor by
+the innovations.
 """
 
 import numpy as np
@@ -19,7 +19,7 @@ AGREEMENT_S = 1.0  # chosen, held by test_judges; integrity.md has what it makes
 DOUBTED_RATIO, TRUSTED_RATIO = 4.0, 2.0
 # a reversed flow agrees as the speed passes through 0; fused then, it went 20 m off beside GPS (test_protection)
 DOUBT_S = 5.0
-LONGEST_STEP_S = 1.0  # chosen: readings further apart say nothing of each other
+LONGEST_STEP_S = 1.0  # chosen: readings further apart are independent
 FULL_QUALITY = 255.0
 LEAST_RANGE_M = 0.05  # keeps a share finite: no flow is fused so near
 LEAST_STEP_S = 1e-3  # keeps a division finite
@@ -140,7 +140,7 @@ def wrong_since(t_s: float, likeness: float, wrong_s: float) -> float:
 
 @equation
 def lasting_walk(range_m: float, speed_m_s: float, s: FlowSettings) -> float:
-    """The walk of a position that flow alone tells [m2/s]: 2 e^2 tau of a velocity error e that lasts for tau.
+    """The walk of a position that flow alone determines [m2/s]: 2 e^2 tau of a velocity error e that lasts for tau.
 
     White noise averages out, and what lasts of a flow's error does not: a part as of a gyro, over the range, and a part
     of the speed.

@@ -53,7 +53,7 @@ from flownav.navigation.verdicts import (
 from flownav.navigation.vibration import doubted_imu
 
 # Logs are those of ../shared/data; a stray is a range that neither of the two before it confirms.
-# Refused so long, a range that alone tells the height is believed, not the accelerometer: chosen; at once, a lone echo
+# Refused so long, a range that alone gives the height is believed, not the accelerometer: chosen; at once, a lone echo
 # would make the accelerometer doubted.
 DOUBTING_S = 0.05
 LEANING_SHARE = 0.5  # of a range that is fused in the mean of those before it
@@ -65,8 +65,8 @@ STRAYS_OVER_RANGES = 20.0  # chosen; nine that agree then end a step of the grou
 MANY_STRAYS = 0.15  # sonars that jump have 0.11 (outdoor-3) and 0.78 (outdoor-2) of strays, sound ones 0.02 at most
 UNSEEN_M_S = 1.0  # climb or descent that a repeated range may hide: chosen, what it weighs is held by test_judges
 LONGEST_REPEAT_S = 2.0  # a still hover repeats one value for 1.9 s (outdoor), a range beyond reach for 2.1 (outdoor-3)
-SERVED_S = 1.0  # believing a range that says the same from the first on, 436 of 480 gusty approaches land; else 455
-UNAIDED_TRAVEL_RATIO = 5.0  # times the travel, where nothing else tells the height: chosen, held by test_judges
+SERVED_S = 1.0  # believing a range that is constant from the first on, 436 of 480 gusty approaches land; else 455
+UNAIDED_TRAVEL_RATIO = 5.0  # times the travel, where nothing else measures the height: chosen, held by test_judges
 
 
 with_value = replacing(RangeMemory, "last_m", "same_s", "down_m")
@@ -148,8 +148,8 @@ def judge_ground(below_m: float, range_m: float, t_s: float, alone: bool, g: Gro
     """Whether ranges in a row agree on a ground that is new, and the memory of it.
 
     One echo finds no ground. A range that repeats itself to the last digit must do so for long: a vehicle that stands
-    reads so, and so does a sensor that holds an old value for a moment. Where nothing else tells the height, the first
-    range must serve, before the vertical speed is lost.
+    reads so, and so does a sensor that holds an old value for a moment. Where nothing else measures the height, the
+    first range must serve, before the vertical speed is lost.
     """
     agrees = g.agreeing > 0.0 and abs(below_m - g.candidate_m) <= AGREEMENT_M + AGREEMENT_SHARE * range_m
     since_s = g.since_s if agrees else t_s
@@ -250,10 +250,10 @@ def judge_refusal(
 ) -> Refusal:  # fmt: skip
     """After the test: a range that is refused first makes the accelerometer doubted, then the ground new.
 
-    The accelerometer is doubted where the range crept out of its gate and stays out, or alone tells the height.
-    A streak of refusals ends where the sensor says something else. The ground is found anew where ranges agree on it
-    for long, and where they do not, its candidate is followed; a vehicle that stands stands on the ground it has.
-    Whether it was a step of the ground or the height was wrong, nobody knows: by so much the height may be off.
+    The accelerometer is doubted where the range crept out of its gate and stays out, or alone measures the height. A
+    streak of refusals ends where the sensor reads something else. The ground is found anew where ranges agree on it for
+    long, and where they do not, its candidate is followed; a vehicle that stands stands on the ground it has. Whether
+    it was a step of the ground or the height was wrong, nobody knows: by so much the height may be off.
     """
     m, echo, g = memory
     fused, refused = tested.reason == FUSED, tested.reason == INNOVATION_GATE

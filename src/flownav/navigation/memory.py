@@ -62,7 +62,7 @@ from flownav.navigation.records import (
     WhitenessMemory,
 )
 
-UNHELD_S = 1.0  # without a fix of GPS, nothing but flow tells the velocity: chosen as PX4's time to dead reckoning
+UNHELD_S = 1.0  # without a fix of GPS, nothing but flow measures the velocity: chosen as PX4's time to dead reckoning
 
 MEMORY = Layout(FILTER_ROWS)
 MEMORY.name(PositionNed, *(STATE + POSITION + i for i in range(3)))

@@ -37,9 +37,9 @@ class ImuMemory(NamedTuple):
 
 class StandMemory(NamedTuple):
     """does: what the vehicle did in the last window, `still.MOVES`, SHAKEN or RESTS; contact_m: the range when it
-    rested last, NaN where it has not; last_m: the last range of all, NaN before the first; windows: how many, one
-    after the other, in which it did that; grounded: 1 while it stands, and until the first window tells; gps_m_s: the
-    fastest level velocity by GPS in the last window.
+    rested last, NaN where it has not; last_m: the last range of all, NaN before the first; windows: how many, one after
+    the other, in which it did that; grounded: 1 while it stands, and until the first window ends; gps_m_s: the fastest
+    level velocity by GPS in the last window.
     """
 
     does: float = 0.0

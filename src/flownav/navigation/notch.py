@@ -23,7 +23,7 @@ LEAST_NOTCH_HZ = 8.0  # chosen: a notch below would take the vehicle's own motio
 WIDTH = 6.0  # f over the width at -3 dB; chosen: 2 and 4 take more of a touchdown's jolt (test_notch)
 SPEED_S = 1.0  # chosen: the rotor's speed is found in seconds, and a governor moves it slower
 MOST_OFF = 0.1  # chosen: a tone further off is another rotor's
-LEAST_TONE_M_S2 = 0.1  # chosen: a weaker tone tells no speed
+LEAST_TONE_M_S2 = 0.1  # chosen: a weaker tone determines no speed
 STEADY_S = 0.03  # chosen: 0.3 takes a sway of 1 m/s2 at 1 Hz for noise, three times too much (test_notch)
 Force = tuple[float, float, float]  # specific force [m/s2], body FRD
 

@@ -206,7 +206,7 @@ def mixed(found: np.uint64, value: float) -> np.uint64:
 
 @procedure
 def digest_of(work: Work) -> float:
-    """64 bits over everything that a navigator knows and remembers, as the bits of a float; not over its scratch."""
+    """64 bits over the whole memory of a navigator, as the bits of a float; not over its scratch."""
     found = MIXED
     for i in range(SCRATCH):
         found = mixed(found, work[i])

@@ -43,7 +43,7 @@ CARRIED_M = 0.1  # chosen, not measured; 0.05 m stays and 0.15 m goes along (tes
 # has seen it
 NEVER_STOOD, STOOD_ON, LEFT, SEEN = -1.0, 1.0, 2.0, 3.0
 
-# Above the ground of any vehicle that stands on it: chosen; `windows` tells how fast one is that does.
+# Above the ground of any vehicle that stands on it: chosen; `windows` has the speed of one that does.
 ALOFT_M = 1.0
 
 with_landed = replacing(AidMemory, "landed")
@@ -73,7 +73,7 @@ MEMORY.name(Sight, *(MEASURED + i for i in range(3)))
 
 @equation
 def pad_at(north_m: float, east_m: float, down_m: float, goes: bool) -> tuple[Reset, Reset, Reset]:
-    """The pad is there, as far as anyone knows."""
+    """Resets that put the pad at a place of unknown certainty, where `goes` holds."""
     unknown = UNKNOWN_M * UNKNOWN_M
     return (
         Reset(PAD if goes else -1, north_m, unknown),
@@ -184,7 +184,7 @@ def judge_sight(
     *, component: int, alone: bool, s: PlaceSettings,
 ) -> PadOffer:  # fmt: skip
     """One component of a pad fix. All three are judged together: what is not the pad may lie in line with it along one
-    of them, and there its lever would turn the heading. alone: whatever the others say.
+    of them, and there its lever would turn the heading. alone: without regard to the others.
     """
     reason, fixed = judge_pad(reading, component, start.started, s)
     variance = fixed + late_variance(velocity, m, reading.value_2, component, s)
@@ -207,7 +207,9 @@ def count_refusals(fate: Fate, m: PadMemory) -> PadMemory:
 
 @procedure
 def take_pad(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
-    """The pad from the lens. Its place is a state: the first fix finds it, every one tells both it and the vehicle."""
+    """The pad from the lens. Its place is a state: the first fix finds it, every one corrects both it and the
+    vehicle.
+    """
     s = load_place_settings(p)
     find_pad(work, lanes, t_s, s, o)
     for component in range(3):
@@ -304,7 +306,7 @@ def tie_to_pad(reading: Reading, m: PadMemory) -> Offer:
 @procedure
 def take_landed(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
     """On the ground: no velocity, and before a flight the pad is where the vehicle stands. In flight, nothing; nor
-    where a range, a receiver or the flow says that it flies: whoever says "landed" is one witness among them.
+    where a range, a receiver or the flow shows that it flies: a report of "landed" is one witness among them.
     """
     s = load_place_settings(p)
     for axis in range(3):

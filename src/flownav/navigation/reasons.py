@@ -16,7 +16,7 @@ SILENT = -1  # no row for this component in this lane: there was no reading, or 
 
 @equation
 def is_heard(reading: Reading) -> bool:
-    """Whether a reading is there for one who only listens: it arrived, has data and is not withheld."""
+    """Whether a reading is there for a memory that only watches: it arrived, has data and is not withheld."""
     return reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
 
 
@@ -45,5 +45,5 @@ def usable_in_flight(reading: Reading, value: float, variance: float, started: f
 
 
 HORIZONTAL = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.POSE)
-# A reading that knows nothing, or that another serves for, is no alarm; these are.
+# A reading without data, or that another serves for, is no alarm; these are.
 REFUSALS = (Reason.INNOVATION_GATE, Reason.NOT_FINITE, Reason.DUPLICATE, Reason.LATE, Reason.STUCK, Reason.AHEAD)

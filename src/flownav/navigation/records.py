@@ -292,7 +292,7 @@ class Levels(NamedTuple):
 
 
 class ScaleDoubt(NamedTuple):
-    """Standard deviation of a flow scale that nothing can tell; 0 where the filter learns it."""
+    """Standard deviation of a flow scale that nothing determines; 0 where the filter learns it."""
 
     sigma: float = 0.0
 

@@ -73,7 +73,7 @@ class Due(NamedTuple):
 class Rings:
     """Readings that wait for their instant; inertial ones stay, for the turning over an exposure and the way to now.
 
-    most: how many `release` hands over at a time.
+    most: how many `release` gives at a time.
     """
 
     def __init__(self, sizes: Sizes, most: int) -> None:

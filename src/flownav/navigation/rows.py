@@ -1,4 +1,4 @@
-"""The rows of a tape, by name: what the filter says at an instant, what became of a component, a happening.
+"""The rows of a tape, by name: the filter's estimate at an instant, the outcome of a component, a happening.
 
 Each is a record of one row's numbers in a kernel, and of whole columns where `of` takes rows apart.
 """
@@ -85,7 +85,7 @@ class InnovationRow(NamedTuple, Generic[Value]):
 
 
 class EventRow(NamedTuple, Generic[Value]):
-    """A happening; kind: a place in `tape.EVENT_NAMES`, which says what the value is."""
+    """A happening; kind: a place in `tape.EVENT_NAMES`, which names the value's meaning."""
 
     t_s: Value
     kind: Value
@@ -131,7 +131,7 @@ def of_unknown_scale(work: Work, lanes: Lanes, state: int, lane: int) -> float:
 
 @equation
 def position_variance(work: Work, lanes: Lanes, axis: int, lane: int) -> float:
-    """Variance of position [m2]; level, with what a flow scale that nothing tells makes of it."""
+    """Variance of position [m2]; level, with the error of a flow scale that nothing determines."""
     unknown_m = of_unknown_scale(work, lanes, POSITION + axis, lane) if axis < 2 else 0.0
     return variance_of(work, lanes, POSITION + axis, lane) + unknown_m * unknown_m
 
@@ -159,7 +159,7 @@ def deviation_of(work: Work, lanes: Lanes, state: int, lane: int) -> float:
 
 @equation
 def body_velocity_variance(work: Work, lanes: Lanes, lane: int, north: float, east: float, down: float) -> float:
-    """e' P_vv e of one body axis e in earth NED [m2/s2], with what a flow scale that nothing tells makes of it."""
+    """e' P_vv e of one body axis e in earth NED [m2/s2], with the error of a flow scale that nothing determines."""
     axis = (north, east, down)
     unknown = north * of_unknown_scale(work, lanes, VELOCITY, lane)
     unknown += east * of_unknown_scale(work, lanes, VELOCITY + 1, lane)

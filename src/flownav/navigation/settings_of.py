@@ -22,8 +22,8 @@ from flownav.sensors.magnetometer import MagneticField, MagnetometerSheet
 from flownav.sensors.range_sensor import RangeSensorSheet
 from flownav.sensors.sheets import AccelerometerSheet, GpsReceiverSheet, GyroSheet, InertialSheet, SensorSheets
 
-ABOVE_FLOOR_M = 0.01  # a step of the shipped lidar: a rangefinder that reads its floor says only that there is no more
-LEAST_SHARE = 0.05  # of a stated accuracy, where the sheet says what changes from fix to fix: chosen, not measured
+ABOVE_FLOOR_M = 0.01  # a step of the shipped lidar: a rangefinder that reads its floor shows only that there is no more
+LEAST_SHARE = 0.05  # of a stated accuracy, where the sheet states the change from fix to fix: chosen, not measured
 BIAS_LIMIT_SIGMAS = 3.0  # a limit leaves room for all but 3 in 1000 units; chosen
 VIBRATION_MARGIN = 2.0  # chosen, not measured: what is beyond twice the stated vibration, the sheet does not know
 # slower motion is held by what aids the IMU: level velocity errs by 1.17 of what is stated with 2, by 1.02 with 4
@@ -37,7 +37,7 @@ INTEGRATED_M_RT_S = 0.002
 # by more than a share that lasts does. With all of it z errs by 0.80 of what is stated (`takeoff`), with half by 0.87
 SCALE_SHARE = 0.5
 FOLLOWED_TO = 0.002  # a notch follows its tone within this (test_notch), whatever the rotor does
-LAGS_AS_STATED = 2.0  # of a receiver's filter: 0.2 to 0.3 s were found in two logs where sheets say 0.1 s (validate)
+LAGS_AS_STATED = 2.0  # of a receiver's filter: 0.2 to 0.3 s were found in two logs where sheets state 0.1 s (validate)
 WASH_LASTS_S = 3.0  # chosen, not measured: how long a rotor's wash deceives a barometer
 CLIMB_M_S = 1.0  # chosen: a lag errs by its length in a descent at this speed
 
@@ -52,7 +52,7 @@ class Told(NamedTuple):
 
     @property
     def lag_states(self) -> bool:
-        """Whether the flow sensor's dynamics are states of the filter: by its file, or as the user says."""
+        """Whether the flow sensor's dynamics are states of the filter: by its file, or as the user states."""
         return self.settings.flow_lag_c_1_s2 > 0.0
 
 

@@ -60,7 +60,7 @@ class Mark(NamedTuple):
 
 
 class Backward(NamedTuple):
-    """lambda (STATES,) and Lambda (STATES, STATES): what later readings say of the error state."""
+    """lambda (STATES,) and Lambda (STATES, STATES): the information of later readings on the error state."""
 
     vector: Array
     matrix: Array

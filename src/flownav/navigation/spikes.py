@@ -109,7 +109,7 @@ def doubt_of(reading: Reading, step_s: float, m: ImuMemory, s: SpikeMemory) -> f
 
 @equation
 def turning_doubt_of(reading: Reading, step_s: float, m: ImuMemory, s: SpikeMemory) -> float:
-    """Variance that a hit adds to the attitude [rad2], of what the gyro says."""
+    """Variance that a hit adds to the attitude [rad2], by the gyro's reading."""
     gyro = distance(reading.value_0 - m.gyro_x, reading.value_1 - m.gyro_y, reading.value_2 - m.gyro_z)
     return grown(gyro, step_s, MOST_DOUBT_RAD, s)
 

@@ -199,7 +199,9 @@ def levelling(m: StartMemory, bias_sigma: float, rectified: float, read: bool, u
 
 @equation
 def heading_sigma(read: bool, lost: bool, unknown: bool, field_rad: float, heading: float) -> float:
-    """How unsure the first heading is [rad]. lost: the start does not define the frame; unknown: no sensor tells it."""
+    """How unsure the first heading is [rad]. lost: the start does not define the frame; unknown: no sensor determines
+    it.
+    """
     known = heading == NO_HEADING and not lost
     turned = DATUM_HEADING_RAD if known else (READ_HEADING_RAD if read else COMPASS_HEADING_RAD)
     turned = UNKNOWN_RAD if unknown else turned

@@ -99,7 +99,7 @@ def touches(m: StandMemory, seen: SeenWindow) -> bool:
 
 @equation
 def contradicted(m: StandMemory, seen: SeenWindow) -> bool:
-    """Whether what was read since the last window says that a vehicle which stood then does no longer."""
+    """Whether the readings since the last window show that a vehicle which stood then does no longer."""
     ranged = seen.range_high_m >= 0.0
     return (
         ranged and (seen.range_high_m > contact_range(m.contact_m) or not is_steady(seen))
@@ -108,7 +108,7 @@ def contradicted(m: StandMemory, seen: SeenWindow) -> bool:
 
 @equation
 def is_down(m: StandMemory, seen: SeenWindow) -> bool:
-    """Whether the ground is as near as it was when the vehicle stood on it, as far as ranges tell since the window."""
+    """Whether the ground is as near as it was when the vehicle stood on it, as far as ranges since the window show."""
     return seen.range_high_m >= 0.0 and seen.range_high_m <= m.contact_m + STEADY_RANGE_M
 
 

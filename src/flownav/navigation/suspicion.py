@@ -44,7 +44,7 @@ MEMORY_S = 20.0  # over which the innovations' evidence of faults fades
 EXCLUDED_SIGMAS = 8.0  # from a fault that is there or is not; never excluded, its effect has no bound (test_protection)
 PUZZLING_EVIDENCE = 9.0  # 3 sigma, for a fault that is there or is not, after which it may be there for long
 WINDOW_S = 20.0  # a fault that lasts is sought from the start of such a window
-# evidence that says so (4.9 sigma), and that says so no more (2.2); at 0 none is cleared (test_protection_by_hand)
+# evidence that raises a suspicion (4.9 sigma), and that ends it (2.2); at 0 none is cleared (test_protection_by_hand)
 SUSPECT_EVIDENCE, CLEAR_EVIDENCE = 24.0, 5.0
 HELD_S = 10.0  # so long a suspicion lasts at least: what the fault did is still there; chosen, not measured
 with_left_over = replacing(SuspicionMemory, "left_over_m")

@@ -147,8 +147,8 @@ def watch_others(work: Work, lanes: Lanes, sensor: int) -> None:
 
 @equation
 def consider_datum(work: Work, lanes: Lanes, fitted: Equipment) -> None:
-    """A heading that nothing refers to the earth is a datum: only the gyro moves it, and only rest tells its bias. One
-    that is yet to be found from the course is one until then, and by it GPS would turn every push into tilt.
+    """A heading that nothing refers to the earth is a datum: only the gyro moves it, and only rest determines its bias.
+    One that is yet to be found from the course is one until then, and by it GPS would turn every push into tilt.
     """
     datum = fitted.heading == NO_HEADING and not np.isfinite(fitted.deadline_s)
     if not fitted.use_attitude and (datum or seeks(work, lanes)):

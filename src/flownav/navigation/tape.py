@@ -1,8 +1,8 @@
 """A navigator's output as it runs: estimates, the outcome of each component, happenings, and a smoother's journal.
 
 A `Tape` holds them for every lane, and `Output` is what kernels take of it: pointers. Estimates and components are
-written at the same instants in all lanes (their schedule is the same); a lane that has nothing to say there has NaN
-for its time, or the reason SILENT. Happenings come when they come, lane by lane. A tape without rows only counts.
+written at the same instants in all lanes (their schedule is the same); a lane without a row there has NaN for its time,
+or the reason SILENT. Happenings come when they come, lane by lane. A tape without rows only counts.
 """
 
 from collections.abc import Mapping

@@ -20,7 +20,7 @@ from flownav.navigation.verdicts import Noise, Tested, on_lanes
 # white innovations of any size hardly raise the factor (test_trust: 1.26 in the mean square, 1.57 with the block before
 # alone). Each but the largest, halved or doubled, fails test_trust, but for a pace half and a likeness twice as large.
 BLOCK_S = 0.1
-LONGEST_BLOCK_S = 1.0  # readings further apart say nothing of each other
+LONGEST_BLOCK_S = 1.0  # readings further apart are independent
 FOLLOWING_BLOCKS = 10.0
 BLOCKS_BEFORE = 3.0  # what a block is held against, exponentially
 LIKENESS_ALLOWED = 0.15

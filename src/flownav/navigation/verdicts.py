@@ -1,9 +1,9 @@
 """Parts of a judge's verdict beyond its memory, and what takes them: an offer to the filter, an event, a state reset, a
 doubt.
 
-A judge is `judge(reading, what the filter says, memory, settings) -> verdict` on one lane's records, decorated with
-`on_lanes`: the loop over lanes, the loads and the stores are generated, and each part of a verdict goes where it
-belongs. Nothing is left in rows for a later function to find.
+A judge is `judge(reading, estimates, memory, settings) -> verdict` on one lane's records, decorated with `on_lanes`:
+the loop over lanes, the loads and the stores are generated, and each part of a verdict goes where it belongs. Nothing
+is left in rows for a later function to find.
 """
 
 from typing import NamedTuple
@@ -114,7 +114,7 @@ class AxisVelocity(NamedTuple):
 
 
 class AxisBias(NamedTuple):
-    """The gyro's bias about one body axis, as the filter says [rad/s], and its variance."""
+    """The filter's estimate of the gyro's bias about one body axis [rad/s], and its variance."""
 
     rad_s: float
     variance: float
@@ -172,7 +172,7 @@ class Measured(NamedTuple):
 
 
 class GyroShare(NamedTuple):
-    """By how much the filter's bias of the gyro is in the flow reading at hand."""
+    """Share of the filter's gyro bias in the flow reading at hand."""
 
     share: float
 

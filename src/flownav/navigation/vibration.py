@@ -1,7 +1,7 @@
 """An accelerometer that lies: vibration is rectified, and a hover may read half of gravity less than there is.
 
 Two signs of it: readings that differ much from one to the next, and, where a filtered reading hides that, a range that
-contradicts the motion: it creeps out of its gate, or nothing else tells the height. Either lets the accelerometer's
+contradicts the motion: it creeps out of its gate, or nothing else measures the height. Either lets the accelerometer's
 biases walk and widens their limit, on every axis, so that range, flow, barometer or GPS keep the velocity.
 """
 
@@ -53,7 +53,7 @@ def followed_gyro_power(reading: Reading, m: ImuMemory, dt_s: float) -> float:
     times its variance, and little of the vehicle's motion (`notch.followed_density`).
 
     Vibration that a unit of 50 Hz reads at its aliases turns an attitude as white noise does: 1 rad/s rms by 0.14 rad
-    in a second, which no datasheet knows.
+    in a second, which no datasheet states.
     """
     p = reading.value_0 - m.gyro_x - m.change_p
     q = reading.value_1 - m.gyro_y - m.change_q

@@ -181,7 +181,7 @@ _fixed: list[tuple[CarriedSensor, ...]] = []
 
 
 def carry(sensor: CarriedSensor) -> None:
-    """One more sensor for every vehicle, read after the others; before anything of the simulator is imported."""
+    """Add a sensor to every vehicle, read after the others; before anything of the simulator is imported."""
     if _fixed:
         raise RuntimeError(f"{sensor.name}: what vehicles carry is known once the simulator is imported")
     says = [said.say for said in sensor.says]

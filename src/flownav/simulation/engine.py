@@ -92,7 +92,7 @@ def fly_into(
     flight: Flight, seed: int, first: int, lanes: tuple[int, ...], b: Buffers, ensemble: Ensemble | None = None,
     instead: Instead = NOTHING_ELSE, *, compiled: bool = True,
 ) -> None:  # fmt: skip
-    """Fly a block into its buffers, each lane as the flight's sheets say, as the ensemble draws it or as its branch is.
+    """Fly a block into its buffers, each lane by the flight's sheets, as the ensemble draws it or as its branch is.
 
     compiled False: in plain Python (tests; it is a thousand times slower). InputError as `Ensemble.truths`.
     """

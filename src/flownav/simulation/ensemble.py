@@ -48,7 +48,7 @@ LOT_FLIGHTS = 64  # flights whose numbers are drawn together
 
 
 def believed(flight: Flight) -> Truth:
-    """The truth of a flight that is what its datasheets say; the sensors that it has not are zeros."""
+    """The truth of a flight by its datasheets; the sensors that it has not are zeros."""
     onboard = flight.onboard
     if onboard is None:
         none = {part: PARTS[part](*([0.0] * SIZES[part])) for part in (*NAMES, "camera_flow")}
@@ -134,7 +134,7 @@ class Ensemble:
     def _drawn(self, seed: int, number: int) -> dict[str, Array]:
         """The numbers of LOT_FLIGHTS flights, the `number`-th such lot: SciPy takes as long for one as for all of them.
 
-        A flight stands at the same place of the same lot whoever asks for it, and so has the same bits.
+        A flight stands at the same place of the same lot in every call, and so has the same bits.
         """
         flights = range(number * LOT_FLIGHTS, (number + 1) * LOT_FLIGHTS)
         spread = uniforms if self.design is None else self.design.uniforms

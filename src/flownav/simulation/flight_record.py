@@ -110,13 +110,13 @@ def _manifest(setup: Setup, seed: int, index: int, duration_s: float) -> dict[st
 def _add_papers(
     record: Record, setup: Setup, history: dict[tuple[str, str], Array], t_s: Array, table: Callable[..., None]
 ) -> None:
-    """The paper's filter (or none), which takes the INS's attitude as it comes and says nothing of its consistency."""
+    """The paper's filter (or none), which takes the INS's attitude as it comes and states no consistency."""
     attitude = {name: history["gps", name] for name in QUATERNION}
     own = tuple(c for c in TABLES["estimate"] if c not in (*QUATERNION, *PROTECTION_LEVELS))
     table("estimate", "estimate", own, **attitude)
     every = np.full(len(t_s), 255.0)
     table("gps_position", "gps", COLUMNS[Sensor.GPS_POSITION], quality=every)
-    if setup.scenario.gps.model != "white":  # with white noise the unit's velocity is the truth and nobody's input
+    if setup.scenario.gps.model != "white":  # with white noise the unit's velocity is the truth and no input
         table("gps_velocity", "gps", COLUMNS[Sensor.GPS_VELOCITY], quality=every)
     table("attitude", "gps", COLUMNS[Sensor.ATTITUDE], quality=every)
     table("flow_velocity", "flow", (*VELOCITY_BODY, "sigma_m_s"), quality=255.0 * history["flow", "engaged"])

@@ -20,7 +20,7 @@ class Family(NamedTuple):
 
 
 class Inverse(NamedTuple):
-    """A distribution as a campaign asks it; it stands for SciPy's of the same family."""
+    """A distribution as a campaign uses it; it stands for SciPy's of the same family."""
 
     family: Family
     shapes: tuple[float, ...]

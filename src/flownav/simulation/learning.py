@@ -58,7 +58,7 @@ def mind(
     before: Learnt, autopilot: AutopilotState, said: Estimated, home: Home, known: Knowledge, *, gains: AutopilotGains,
     passed: int,
 ) -> Minded:  # fmt: skip
-    """Whether it goes on: in flight, not low, not going around, near the tilt that is asked for; else it waits.
+    """Whether it goes on: in flight, not low, not going around, near the commanded tilt; else it waits.
 
     passed: epochs since it was to begin.
     """
@@ -79,7 +79,7 @@ def mind(
 
 @procedure
 def stir_lane(work: Work, lanes: Lanes, lane: int, told: Told) -> None:
-    """One lane's epoch of the stir. What the last one shows is noted, and what comes next is asked for."""
+    """One lane's epoch of the stir. Note the last one's measurement, and command the next."""
     learnt = layout.load_learnt(work, lanes, lane)
     since = int(learnt.since) - 1
     stir = Stir(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

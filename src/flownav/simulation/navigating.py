@@ -231,7 +231,7 @@ def note_knowledge(
     east = variance.over_e_m2 if found else variance.own_e_m2
     sigma_m = np.sqrt(larger(larger(north, east), 0.0)) if np.isfinite(north + east) else np.inf
     unseen_s = before.pad_unseen_s + EPOCH_S
-    powerless_s = before.powerless_s + EPOCH_S if around.engine == 0.0 else 0.0  # as the speed controller tells
+    powerless_s = before.powerless_s + EPOCH_S if around.engine == 0.0 else 0.0  # as the speed controller reports
     return Knowledge(
         1.0 if found else 0.0, ground.known, unseen_s, sigma_m, 1.0 if suspicion.suspected > 0.0 else 0.0, powerless_s
     )

@@ -158,7 +158,7 @@ def inertial_sheet(scenario: Wishes, sheet: InertialSheet, lens_down_m: float) -
 
 
 def receiver_sheet(scenario: Wishes, sheet: GpsReceiverSheet, lens_down_m: float) -> GpsReceiverSheet:
-    """The receiver: the paper's white noise at 50 Hz, or the sheet with what the scenario says of its errors."""
+    """The receiver: the paper's white noise at 50 Hz, or the sheet with the scenario's changes to its errors."""
     gps = scenario.gps
     if gps.model == "white":
         white = dict.fromkeys(("slow_sigma_m", "slow_sigma_down_m", "fast_sigma_m", "fast_sigma_down_m", "spread"), 0.0)
@@ -191,7 +191,7 @@ def camera_sheet(scenario: Wishes, sheet: FlowCameraSheet, lens_down_m: float) -
 
 
 def range_sheet(scenario: Wishes, sheet: RangeSensorSheet, lens_down_m: float) -> RangeSensorSheet:
-    """The rangefinder with what the scenario says of it, its lens where the scenario puts it."""
+    """The rangefinder with the scenario's changes, its lens where the scenario puts it."""
     sonar = scenario.rangefinder
     said = {name: getattr(sonar, name) for name in sonar.model_fields_set}
     return on_clock(sheet.model_copy(update=said | {"lens": at_height(sheet.lens, lens_down_m)}))

@@ -61,8 +61,8 @@ class FlightPlan(NamedTuple):
 class OwnParts(NamedTuple):
     """Addresses of C functions that fly in place of ours on one lane, each called with the lane buffer; 0: ours flies.
 
-    step: the vehicle, (work, dt [s]) moves it and says its thrust, ground load and power; dt 0 is the start. steer: the
-    attitude loop, (work) sets the controls of the next ATTITUDE_S.
+    step: the vehicle, (work, dt [s]) moves it and reports its thrust, ground load and power; dt 0 is the start. steer:
+    the attitude loop, (work) sets the controls of the next ATTITUDE_S.
     """
 
     step: int
@@ -93,4 +93,4 @@ class Flight(NamedTuple):
     limits: TouchdownLimits
     fails: bool | None = None  # its sensors may fail, each lane's as its truth has it; None: the code is not compiled
     learns: Told | None = None  # what is believed of a vehicle that may be learnt in hover; None: it is not compiled
-    own: OwnParts | None = None  # vehicle and controller that somebody else wrote (room parts/)
+    own: OwnParts | None = None  # a user's own vehicle and controller (room parts/)

@@ -116,7 +116,7 @@ class Landed(NamedTuple):
 
 
 class SeesFlow(NamedTuple):
-    """1 where the last reading of the navigator's camera says anything."""
+    """1 where the last reading of the navigator's camera has data."""
 
     sees: float
 
@@ -132,7 +132,7 @@ class Exposed(NamedTuple):
 
 
 class Late(NamedTuple):
-    """How much older than its datasheet says a sensor's readings are; 0 before the first epoch."""
+    """How much older than by its datasheet a sensor's readings are; 0 before the first epoch."""
 
     late_s: float
 
@@ -159,7 +159,7 @@ class InertialThen(NamedTuple):
 
 
 class PadPlace(NamedTuple):
-    """Where the pad is in the navigator's frame, as far as the vehicle knows."""
+    """Where the pad is in the navigator's frame, by the vehicle's knowledge."""
 
     north_m: float
     east_m: float
@@ -182,7 +182,7 @@ class Estimated(NamedTuple):
 
 
 class Nees(NamedTuple):
-    """Its normalised error squared, of position and velocity NED; 0 where the filter does not say."""
+    """Its normalised error squared, of position and velocity NED; 0 where the filter states none."""
 
     nees: float
 

@@ -1,4 +1,4 @@
-"""Scenario files: what is flown, with which vehicle, sensors, wind, filter and autopilot.
+"""Scenario files: the path, vehicle, sensors, wind, filter and autopilot.
 
 `sortie`, `takeoff`, `landing`, `gusty`, `pad_return` and `approach` ship; any TOML file of this schema flies. Positions
 are those of the skids relative to the pad's centre, in the local NED frame.
@@ -151,8 +151,8 @@ _SheetFiles: Any = create_model("_SheetFiles", __base__=ParameterModel, **_files
 class SensorsSection(_SheetFiles):
     """The datasheets of what the vehicle carries for its navigator; the shipped ones unless named.
 
-    `gps`, `rangefinder` and `pad_fix` of the scenario stand above what the sheets say. texture: whether flow finds it
-    everywhere or on the pad alone.
+    `gps`, `rangefinder` and `pad_fix` of the scenario stand above the sheets. texture: whether flow finds it everywhere
+    or on the pad alone.
     """
 
     texture: Literal["everywhere", "pad"] = "everywhere"

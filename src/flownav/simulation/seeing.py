@@ -170,7 +170,7 @@ def note_seen(reading: Reading, known: Knowledge) -> Knowledge:
 
 # -- skid switch --------------------------------------------------------------------------------------------------
 class Touched(NamedTuple):
-    """The switch for the autopilot, and what the vehicle says of it."""
+    """The switch for the autopilot, and the vehicle's report of it."""
 
     state: skid_switch.SkidSwitchState
     landed: Landed
@@ -186,7 +186,7 @@ def touch(
     state: skid_switch.SkidSwitchState, unit: skid_switch.SkidSwitchUnit, load_n: float,
     n: skid_switch.SkidSwitchNormals, p: skid_switch.SkidSwitchParameters, autopilot: AutopilotState,
 ) -> Touched:  # fmt: skip
-    """The skid switch, and what the vehicle says of it: on the ground, not about to fly, and settled."""
+    """The skid switch, and the vehicle's report of it: on the ground, not about to fly, and settled."""
     after, read = skid_switch.step_skid_switch(state, unit, load_n, n, p)
     landed = 1.0 if at_rest(read.landed, autopilot) else 0.0
     return Touched(after, Landed(read.landed), with_landed(read, landed=landed))

@@ -1,6 +1,6 @@
 """Noise of a flight: every standard normal that it draws, by name, and the normals themselves.
 
-For those who ask which noise made a flight what it was; the kernel draws its own.
+For finding which noise decided a flight; the kernel draws its own.
 """
 
 from typing import Any, NamedTuple

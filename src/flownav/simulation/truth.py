@@ -53,7 +53,7 @@ class SensorFault(NamedTuple):
     noise_first: float = 0.0
     noise_last: float = 0.0
     even_to: float = 0.0  # the first two values are drawn anew, evenly up to this; 0: they are not
-    quality: float = np.nan  # what it says of itself; NaN: as ever
+    quality: float = np.nan  # its own statement; NaN: as ever
     held: float = 0.0  # 1: its first value is that before the fault
     always: float = np.nan  # its first value; NaN: as ever
     spike_share: float = 0.0  # of the readings whose first value is drawn anew, evenly between

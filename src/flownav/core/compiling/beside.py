@@ -48,7 +48,7 @@ def compile_beside(unit: Unit, kernel: Any, *arguments: Any, whole: str = "") ->
 def begin_beside(module: str, name: str) -> None:
     """Where nothing has ever been compiled, begin on a unit that will be needed before what needs it is imported.
 
-    `compile_beside` takes the process over; it ends with this one where nobody does.
+    `compile_beside` takes the process over; it ends with this process otherwise.
     """
     if STORE.is_empty() and can_pay() and not _begun:
         with suppress(OSError):

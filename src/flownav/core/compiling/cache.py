@@ -74,7 +74,7 @@ class Store:
             return False
 
     def save(self, name: str, payload: bytes) -> None:
-        """Keep these bytes, or say why that cannot be."""
+        """Keep these bytes, or report why that cannot be."""
         if not self._usable:
             return
         try:
@@ -90,12 +90,12 @@ class Store:
             self._give_up(error.strerror or str(error))
 
     def _make(self) -> None:
-        """Make the folder, which nobody else may write to whatever the umask."""
+        """Make the folder, which no other user may write to whatever the umask."""
         self.own.parent.mkdir(parents=True, exist_ok=True)
         self.own.mkdir(OWN_FOLDER, exist_ok=True)
 
     def damaged(self, name: str, why: str) -> None:
-        """Say that a file is damaged; it is compiled anew and replaced."""
+        """Report that a file is damaged; it is compiled anew and replaced."""
         self._tell(f"the cached kernel {name.split('-')[0]} is damaged ({why}): compiling it anew")
 
     def _read(self, path: Path, shipped: bool) -> bytes | None:
@@ -138,7 +138,7 @@ class Store:
 
 
 def _mark_used(path: Path) -> None:
-    """The time of a file tells when it was last used, to the day."""
+    """Set the time of a file to that of its last use, to the day."""
     if time.time() - path.stat().st_mtime > 86400.0:
         os.utime(path)
 

@@ -57,7 +57,7 @@ def kernel(function: Function) -> Function:
 
 
 def _tell(module: str, how: str, *told: Any) -> None:
-    """Tell Numba, before anything is compiled, by a function of one of the modules that have it."""
+    """Declare to Numba, before anything is compiled, by a function of one of the modules that have it."""
     when_compiling(lambda: getattr(import_module(f"flownav.core.compiling.{module}"), how)(*told))
 
 

@@ -1,9 +1,9 @@
 """Machine code that was kept, run without the compiler: LLVM links it to Numba's runtime, three small C libraries.
 
-`import numba` takes a third of a second, and telling it of all equations as long again; this takes a twentieth of one.
-The C libraries (what takes an array out of a Python object, what raises an error) are loaded from Numba's folder under
-Numba's own names, so that Numba finds them should something be compiled after all. Whatever is not as this supposes
-(another version, another system) is left to Numba, which loads the same machine code.
+`import numba` takes a third of a second, and declaring all equations to it as long again; this takes a twentieth of
+one. The C libraries (what takes an array out of a Python object, what raises an error) are loaded from Numba's folder
+under Numba's own names, so that Numba finds them should something be compiled after all. Whatever is not as this
+supposes (another version, another system) is left to Numba, which loads the same machine code.
 """
 
 import builtins

@@ -10,7 +10,7 @@ EVERY_S = 0.5
 
 
 class Progress:
-    """News of compilation, for as long as somebody has asked for them (`announce`)."""
+    """Reports of compilation, while a block asks for them (`announce`)."""
 
     def __init__(self) -> None:
         self._lock = threading.RLock()

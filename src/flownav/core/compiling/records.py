@@ -1,9 +1,9 @@
 """Records in a lane buffer, and scalar functions of records made to run on lanes.
 
-A `Layout` says where named tuples lie in a lane buffer. A function of records, decorated with `layout.on_lanes`, is
+A `Layout` assigns named tuples their rows in a lane buffer. A function of records, decorated with `layout.on_lanes`, is
 written without rows, lanes or loops: it takes the records that its parameters are annotated with, and returns those
 that it changes. From the annotations the loop is generated that loads each lane's records, calls the function, and
-stores what it returns; straight-line code, which LLVM vectorises. What a function says beside its memory (an offer to
+stores what it returns; straight-line code, which LLVM vectorises. A result of a function beyond its memory (an offer to
 the filter, an event, a state to reset) is a record that some procedure takes: its sink.
 """
 
@@ -97,16 +97,16 @@ class Layout:
         self.derive(get_type_hints(law)["return"], equation(write_function("found", source, plan.scope)), *plan.told)
 
     def anywhere(self, record: Any, row: str) -> tuple[Callable[..., Any], Callable[..., Any]]:
-        """A record whose first row the caller tells by the name `row`; its access, `load(work, lanes, row, lane)`."""
+        """A record whose first row the caller passes by the name `row`; its access, `load(work, lanes, row, lane)`."""
         self._kept[record] = _Kept(*lane_access(record, None), (row,))
         return self.access(record)
 
     def beside(self, layout: Layout, buffer: str) -> None:
-        """The records of another buffer are known too; the caller tells that buffer by the name `buffer`."""
+        """The records of another buffer are known too; the caller passes that buffer by the name `buffer`."""
         self._kept.update({record: kept._replace(buffer=buffer) for record, kept in layout._kept.items()})
 
     def sink(self, record: Any, take: Callable[..., Any], *needs: str) -> None:
-        """A record that is not stored: `take(work, lanes, lane, value, *needs)` does what it says."""
+        """A record that is not stored: `take(work, lanes, lane, value, *needs)` carries it out."""
         self._sinks[record] = _Sink(take, needs)
 
     def access(self, record: Any) -> tuple[Callable[..., Any], Callable[..., Any]]:
@@ -202,7 +202,7 @@ class _Plan:
         return f"{buffer}lanes, {self.also(kept.told)}lane"
 
     def put(self, kind: Any, value: str) -> list[str]:
-        """Lines that store what was returned, or hand it to its sink."""
+        """Lines that store what was returned, or pass it to its sink."""
         if kind is bool:
             self.truths.append(f"any{len(self.truths)}")
             return [f"{self.truths[-1]} = {self.truths[-1]} or {value}"]

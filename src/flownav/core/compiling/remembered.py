@@ -133,7 +133,7 @@ def _defaults(config: Hashable) -> dict[str, Any]:
 
 
 def _no_timer(*_: Any) -> Any:
-    """Numba times its locks at every call of LLVM, for a note on each kernel that nobody reads."""
+    """Numba times its locks at every call of LLVM, for a note on each kernel that is never read."""
     return nullcontext()
 
 

@@ -206,7 +206,7 @@ class LeanCodegen(JITCPUCodegen):
 
 
 def is_lean() -> bool:
-    """Whether this version of Numba is built as `LeanLibrary` supposes; `FLOWNAV_PLAIN=1` says no."""
+    """Whether this version of Numba is built as `LeanLibrary` supposes; False with `FLOWNAV_PLAIN=1`."""
     parts = ("_finalize_final_module", "_raise_if_finalized", "_get_module_for_linking", "_optimize_functions")
     return Leanness.wanted and all(hasattr(JITCodeLibrary, part) for part in parts)
 

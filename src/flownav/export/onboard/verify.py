@@ -70,7 +70,9 @@ def compare(said: Sequence[Said], given: Sequence[Given], board: Board) -> Found
     """
     last = max((each.readings for each in said if each.readings is not None), default=0)
     if last > len(given):
-        raise InputError(f"a digest is reported after {last} readings, and the flight has {len(given)}: it is another flight")
+        raise InputError(
+            f"a digest is reported after {last} readings, and the flight has {len(given)}: it is another flight"
+        )
     after = {each.readings if each.readings is not None else len(given): each.digest for each in said}
     equal, same = 0, 0
     for count, reading in enumerate(given, 1):

@@ -104,7 +104,7 @@ def campaign(
 
 
 def _fly_for_now(plan: Plan, engine: Engine, records: int, watch: Watch | None) -> Campaign:
-    """Fly into a folder that goes when nobody holds the result any more."""
+    """Fly into a folder that is removed when the result is no longer used."""
     folder = Path(mkdtemp(prefix="flownav-campaign-"))
     try:
         found = fly_plan(plan, engine, folder, records=records, watch=watch, page=False)

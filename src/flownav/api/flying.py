@@ -177,7 +177,7 @@ def _fly_parts(
     setup: Setup, parts: Parts, seed: int, first: int, flights: int, truths: Ensemble | None, facts: dict[str, Any],
     advance: Progress,
 ) -> Flights:  # fmt: skip
-    """Flights with parts of somebody else's, one after the other; the record of the median one."""
+    """Flights with a user's own parts, one after the other; the record of the median one."""
     rows = []
     for index in range(first, first + flights) if flights > 1 else ():
         flown = fly_parts(setup, parts, seed, index, truths, written=False)

@@ -22,7 +22,7 @@ from flownav.scoring.recorded import at_instants, scores_of_other
 
 KNOWN = ("t_s", *TABLES["estimate"], *VELOCITY_NED)
 NEEDED = ("t_s", *POSITION_NED)
-COLUMN_GROUPS = (VELOCITY_BODY, QUATERNION, VELOCITY_NED, PROTECTION_LEVELS)  # columns that say nothing one by one
+COLUMN_GROUPS = (VELOCITY_BODY, QUATERNION, VELOCITY_NED, PROTECTION_LEVELS)  # columns that have no meaning one by one
 MOST_FLIGHT_LENGTHS = 100.0  # times the flight: such an estimate counts other seconds
 UNIT_LENGTH = (0.9, 1.1)  # of a quaternion
 
@@ -157,9 +157,9 @@ def rescored(record: Record, estimate: object, name: str, *, from_handover: bool
 
 
 def _covered(record: Record, columns: Table) -> float:
-    """The share of the instants that are scored (of a replay, of our estimate's) at which the other says a position.
+    """The share of the instants that are scored (of a replay, of our estimate's) at which the other has a position.
 
-    InputError where it says none at any of them.
+    InputError where it has none at any of them.
     """
     judged = record.tables.get("judging") if record.manifest["kind"] == "fly" else None
     t_s = np.asarray(record.tables["truth" if judged is not None else "estimate"]["t_s"], float)

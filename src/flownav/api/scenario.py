@@ -151,7 +151,9 @@ def _given(name: str, value: Any) -> Any:
 
 
 def wind_of(text: str) -> dict[str, float]:
-    """The wind that "8" or "8:270" says: speed at 20 ft [m/s], and where it blows from [deg]. InputError otherwise."""
+    """The wind that "8" or "8:270" stands for: speed at 20 ft [m/s], and where it blows from [deg]. InputError
+    otherwise.
+    """
     speed, _, direction = text.partition(":")
     try:
         given = {"speed_20ft_m_s": float(speed)}

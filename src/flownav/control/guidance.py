@@ -238,7 +238,7 @@ def climb_out(height_m: float, gains: AutopilotGains) -> float:
     )
 
 
-FELT_S = 0.2  # chosen: so long the speed controller must tell it
+FELT_S = 0.2  # chosen: for this long the speed controller must report it
 # chosen by the least sink at the touchdown from 3 and 10 m (control.md)
 GLIDE_M_S, FLARE_1_S, FLARE_RAD = 4.0, 1.3, 0.12
 

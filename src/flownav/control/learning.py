@@ -70,7 +70,7 @@ PRIOR = (0.45, 0.45, 0.25, 0.25, 0.07)  # standard deviations of the unknown: wi
 # of a line's residuals: gusts leave the more the slower they are (their spectrum falls as 1/w²)
 WEIGHTS = np.clip(OMEGA_RAD_S / 12.0, 0.4, 1.2)
 NOTHING_SAID_RAD = 3e-5  # standard deviation of a residual before any is known: a gust's of 4 m/s
-STEEPEST = 0.26  # sine of the tilt beyond what is asked for at which the stir is broken off: 15 degrees
+STEEPEST = 0.26  # sine of the tilt beyond the commanded one at which the stir is broken off: 15 degrees
 
 
 class Stir(NamedTuple):

@@ -67,7 +67,7 @@ def margins_of_learnt(vehicle: VehicleParameters, hover: Trim, learnt: Learnt, g
 def margins_of_record(manifest: Mapping[str, Any], where: str) -> Box:
     """The margins of the gains that a recorded flight found for the vehicle that it learnt. InputError: it learnt none.
 
-    They are computed when they are asked for: they would cost every flight a quarter of a second.
+    They are computed when they are used: they would cost every flight a quarter of a second.
     """
     learnt, parameters = manifest.get("learnt") or {}, manifest.get("parameters") or {}
     vehicle = flattened(described_again(parameters["vehicle"], where)) if learnt.get("verdict") == "learnt" else None

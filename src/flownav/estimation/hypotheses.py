@@ -1,4 +1,5 @@
-"""Faults that may be there and are not modelled: what one unit of each does to the error, and what innovations tell.
+"""Faults that may be there and are not modelled: the effect of one unit of each on the error, and the evidence of
+innovations.
 
 A hypothesis is a constant b that adds h_b b to a reading, or moves the filter by a steady specific force. The mean
 error that it causes is s b, where s goes through the filter as a considered state's covariance does (Schmidt):
@@ -6,10 +7,10 @@ error that it causes is s b, where s goes through the filter as a considered sta
     s <- F s + g   over a step,      s <- s - K c,   c = k h s + h_b   with a reading,
 
 in columns beside the covariance, which change nothing of the estimate. The innovation's mean is then c b, so that
-innovations tell b by a likelihood ratio: information J = sum c^2/S, score d = sum c nu/S, b = d/J (Willsky and Jones, A
+innovations give b by a likelihood ratio: information J = sum c^2/S, score d = sum c nu/S, b = d/J (Willsky and Jones, A
 Generalized Likelihood Ratio Approach to the Detection and Estimation of Jumps in Linear Systems, IEEE Transactions on
-Automatic Control 21(1), 1976).
-What the filter estimates by itself leaves no trace in c: a flow scale that is learnt is no fault.
+Automatic Control 21(1), 1976). What the filter estimates by itself leaves no trace in c: a flow scale that is learnt is
+no fault.
 """
 
 from typing import NamedTuple

@@ -39,7 +39,7 @@ class FlowLag(NamedTuple):
     gain: float
     sonar_floor_m: float  # below it the sensor multiplies its flow by this instead of the range; 0: it does not
     lens_below_m: float  # the lens below the vehicle's reference point, along body down
-    forward_m: float = 0.0  # the lens's lever from the IMU, body FRD; 0 where no gyro tells how it swings
+    forward_m: float = 0.0  # the lens's lever from the IMU, body FRD; 0 where no gyro measures its swing
     right_m: float = 0.0
     below_m: float = 0.0
 

@@ -160,7 +160,9 @@ class Beam(NamedTuple):
 
 
 class FlowMount(NamedTuple):
-    """The flow sensor's lever from the IMU, body FRD (0 where no gyro tells its turning), and its lens's depth [m]."""
+    """The flow sensor's lever from the IMU, body FRD (0 where no gyro measures its turning), and its lens's depth
+    [m].
+    """
 
     forward_m: float
     right_m: float

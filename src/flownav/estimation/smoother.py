@@ -1,9 +1,9 @@
 """The filter's steps run backwards: a modified Bryson-Frazier smoother (docs/explanation/smoother.md).
 
-What later readings say of the error state at an instant is a vector lambda (STATES,) and a matrix Lambda (STATES,
-STATES), both 0 at the end; the smoothed error is -P lambda, its covariance P - P Lambda P (Bierman, Fixed interval
-smoothing with discrete measurements, International Journal of Control 18, 1973). Nothing is inverted, so states
-without variance and states that were reset do no harm. Process noise has no part in it: it is in the filter's
+The information of later readings on the error state at an instant is a vector lambda (STATES,) and a matrix Lambda
+(STATES, STATES), both 0 at the end; the smoothed error is -P lambda, its covariance P - P Lambda P (Bierman, Fixed
+interval smoothing with discrete measurements, International Journal of Control 18, 1973). Nothing is inverted, so
+states without variance and states that were reset do no harm. Process noise has no part in it: it is in the filter's
 covariances.
 """
 
@@ -34,7 +34,7 @@ def back_along_motion(x: Array, dt_s: float, middle: Array, force: Array) -> Non
     """
     half_s = 0.5 * dt_s
     for i in range(3):
-        x[VELOCITY + i] += half_s * x[POSITION + i]  # what the velocity after the step is asked
+        x[VELOCITY + i] += half_s * x[POSITION + i]  # the adjoint of the velocity after the step
     north, east, down = x[VELOCITY], x[VELOCITY + 1], x[VELOCITY + 2]
     asked = (
         dt_s * (force[1] * down - force[2] * east),

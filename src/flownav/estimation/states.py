@@ -29,7 +29,7 @@ GROUND = 27  # 1, down coordinate of the ground below [m]
 BARO = 28  # 1, pressure altitude less true altitude [m]
 FLOW_SCALE = 29  # 1, flow reported over flow by its datasheet, less 1
 COMPASS = 30  # 2, deviation of a compass: coefficients of sin and cos of the heading (hard iron) [rad]
-VELOCITY_LAG = 32  # 1, how much older GPS velocity is than its time says (receivers smooth it) [s]
+VELOCITY_LAG = 32  # 1, how much older GPS velocity is than its time (receivers smooth it) [s]
 PAD = 33  # 3, where the pad's centre lies, local NED [m]
 STATES = 36
 FLOW_LAG = 36  # 4, only where n is STATES_WITH_LAG: the flow sensor's dynamics, x1, x2 forward, x1, x2 right
@@ -75,7 +75,7 @@ SEEN_BY = ("vel_n", "vel_e", "vel_d", "tilt_n", "tilt_e", "heading", "height")
 
 
 class Rows:
-    """Hands out consecutive rows of a lane buffer."""
+    """Allocates consecutive rows of a lane buffer."""
 
     def __init__(self, first: int = 0) -> None:
         self.next = first

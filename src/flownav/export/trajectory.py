@@ -34,10 +34,10 @@ BOUND = ("three_sigma_n_m", "three_sigma_e_m", "three_sigma_d_m")
 class Trajectory(NamedTuple):
     """A path, rows in order of time.
 
-    name: of PATHS. t_s (n,); position_m (n, 3) in the earth frame; quaternion (n, 4)
-    w, x, y, z, body to earth; velocity_m_s (n, 3) in the earth frame, None where the record cannot tell;
-    oriented: False where no attitude was recorded and `quaternion` is level, facing north; row (n,): which row
-    of the record's table each is; left_out: how many rows had no finite time, position or attitude.
+    name: of PATHS. t_s (n,); position_m (n, 3) in the earth frame; quaternion (n, 4) w, x, y, z, body to earth;
+    velocity_m_s (n, 3) in the earth frame, None where the record has none; oriented: False where no attitude was
+    recorded and `quaternion` is level, facing north; row (n,): which row of the record's table each is; left_out: how
+    many rows had no finite time, position or attitude.
     """
 
     name: str

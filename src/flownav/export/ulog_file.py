@@ -175,10 +175,10 @@ class Contents(NamedTuple):
 def write_ulog(record: Record, path: Path, original: Path | None = None) -> tuple[list[Path], list[str]]:
     """Write a ULog file, whole or not at all; the file and notes.
 
-    With `original`, the log that the record was replayed from, a copy of that log with flownav's topics among
-    its own, on its clock: the manifest's `clock_start_s` says what that showed at time 0 of the record. InputError
-    where the original is missing, is no ULog, is not the log that was replayed or does not overlap in time, or
-    where the record holds no path or does not say how its times lie on that clock.
+    With `original`, the log that the record was replayed from, a copy of that log with flownav's topics among its own,
+    on its clock: the manifest's `clock_start_s` is that clock's time at time 0 of the record. InputError where the
+    original is missing, is no ULog, is not the log that was replayed or does not overlap in time, or where the record
+    holds no path or does not say how its times lie on that clock.
     """
     if original is None:
         contents = _all_of(record)
@@ -243,7 +243,7 @@ def _clock_start_s(record: Record, original: Path) -> float:
 
 
 def _from_zero_on(contents: Contents) -> Contents:
-    """Contents without what lies before time 0 of the log's clock, which ULog cannot say; counted in the notes."""
+    """Contents without what lies before time 0 of the log's clock, which ULog cannot hold; counted in the notes."""
     topics = []
     for topic in contents.topics:
         kept = topic.time_us >= 0

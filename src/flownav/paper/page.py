@@ -140,7 +140,7 @@ def panels(flights: Flights) -> list[Panel]:
 
 
 def lift_off_caption(of: LiftOff | None) -> str:
-    """Where the transient comes from: the paper says the sensor's shake."""
+    """Where the transient comes from: the paper names the sensor's shake."""
     if of is None:
         return "The error in w about lift-off."
     shaken, unshaken, share = (spread(of_all) for of_all in (of.shaken_m_s, of.unshaken_m_s, of.frozen_inflow_share))

@@ -1,4 +1,4 @@
-"""The whole reproduction, or one table of it: what is computed, as JSON, and what it says of the paper."""
+"""The whole reproduction, or one table of it: the computed results, as JSON, and their findings on the paper."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The datasheets of a flow camera and of a camera that finds the pad, and the coefficients that follow from them.
 
-Of flow: what a sensor file (`datasheet.FlowSensor`: dynamics, noise, limits) does not say.
+Of flow: what a sensor file (`datasheet.FlowSensor`: dynamics, noise, limits) does not state.
 """
 
 import math

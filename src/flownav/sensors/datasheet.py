@@ -212,7 +212,7 @@ def load_sensor(path: Path | str | None = None) -> FlowSensor:
     return load(Path(path) if path is not None else shipped(DEFAULT_SENSOR), FlowSensor)
 
 
-# -- what the file says to those who use the sensor ---------------------------------------------------------------
+# -- the file's numbers for users of the sensor ---------------------------------------------------------------
 class IdentifiedFlow(NamedTuple):
     """Reported over true velocity of each body axis, the age of a reading, and sensor's axes = axes @ vehicle's.
 

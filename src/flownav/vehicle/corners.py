@@ -75,7 +75,7 @@ def groups_of(file: Any) -> tuple[Groups, Groups]:
 
 
 def corners(path: Path | None = None) -> Iterator[Corner]:
-    """The vehicle as its file says, then every corner of its box; the shipped vehicle where `path` is None.
+    """The vehicle as its file states it, then every corner of its box; the shipped vehicle where `path` is None.
 
     InputError where the file does not fit its schema, or an uncertainty is no number and no `"from..to"`.
     """

@@ -162,7 +162,7 @@ def driven(voltage_v: float, motor_out: float) -> Six:
 def derivative_at_roots(
     state: MultirotorState, roots: Six, around: Around, hexa: bool, vehicle: MultirotorParameters
 ) -> MultirotorState:
-    """The rates of the state while the mixer asks each rotor for a share of its full thrust; cut, the motors stop.
+    """The rates of the state while the mixer commands each rotor a share of its full thrust; cut, the motors stop.
 
     roots: `roots_of_shares`.
     """

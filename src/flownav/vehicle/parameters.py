@@ -6,7 +6,7 @@ from typing import NamedTuple
 from flownav.core.parameter_files import in_si, record_of
 from flownav.vehicle.schema import MainRotor, MultirotorFile, TailRotor, VehicleFile
 
-ROTOR_INERTIA = 1.15  # of all that turns with the main rotor, over that of its blades, where a file says none
+ROTOR_INERTIA = 1.15  # of all that turns with the main rotor, over that of its blades, where a file states none
 
 
 class VehicleParameters(NamedTuple):

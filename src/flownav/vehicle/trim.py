@@ -52,7 +52,7 @@ def settled_state(
     pos_d_m: float, vel_body_m_s: Vector, roll: float, pitch: float, a1: float, b1: float, controls: Controls,
     vehicle: VehicleParameters,
 ) -> HelicopterState:  # fmt: skip
-    """A state over the origin, heading north, without rates, its servos where the controls ask them to be.
+    """A state over the origin, heading north, without rates, its servos where the controls put them.
 
     The rotor has its governed speed; its inflow and what the governor gives are still to be found (`with_rotor`).
     """

@@ -1,4 +1,6 @@
-"""The library's own code run here, compiled for this process: what a board or a browser must say is what this says."""
+"""The library's own code run here, compiled for this process: the output of a board or a browser must equal this
+one's.
+"""
 
 from typing import NamedTuple
 

@@ -213,8 +213,8 @@ def _fill_in_thumb_move(content: bytearray, at: int, target: int, *, high: bool)
 
 # -- a shared object ------------------------------------------------------------------------------------------
 class _Part(NamedTuple):
-    """A section of a shared object: name, type, flags, bytes, alignment, the section it is about, what it says of
-    itself (how many symbols are local), size of an entry.
+    """A section of a shared object: name, type, flags, bytes, alignment, the section it is about, its info field (how
+    many symbols are local), size of an entry.
     """
 
     name: str

@@ -23,7 +23,7 @@ from flownav.navigation.tape import EVENT_NAMES
 ABI = 1  # of structs and functions; another one does not link, since it is in the functions' names
 SYMBOLS = {name: f"flownav_abi{ABI}_{name}" for name in ("begin", "take", "now", "digest")}
 BEFORE = 1.5  # exposures before the instant that a flow reading describes, its middle: from two before its end on
-SPARE = 5  # rows more: one at each end, and readings that come a little sooner than their rate says
+SPARE = 5  # rows more: one at each end, and readings that come a little sooner than by their rate
 WORDS = {  # where a record's own words are of Python
     "status": "see enum flownav_now_status; the rest stands only where it is FLOWNAV_TOLD",
     "aid": "0: something horizontal was fused lately; 1: dead reckoning; 2: the position is invalid",

@@ -1,4 +1,4 @@
-"""`flownav verify`: what a board or a browser says of a flight, held against the same flight computed here."""
+"""`flownav verify`: the output of a board or a browser for a flight, compared with the same flight computed here."""
 
 import hashlib
 import re

@@ -200,7 +200,7 @@ def _put(sample: Sample, made: Path, path: Path, *, force: bool, known: dict[str
 
 
 def _known(folder: Path) -> dict[str, str] | None:
-    """Digests by name of what flownav wrote into a folder, as its README says; None where that is not ours."""
+    """Digests by name of what flownav wrote into a folder, as its README has them; None where that is not ours."""
     readme = folder / README
     text = readme.read_text(encoding="utf-8", errors="replace") if readme.is_file() else ""
     if not text.startswith(FIRST_LINE):

@@ -100,7 +100,7 @@ def _log_camera(stream: Any, entity: str, camera: Camera) -> None:
 
 
 def _log_flow(stream: Any, record: Record, path: Trajectory) -> None:
-    """The velocity that the flow says, as an arrow from the vehicle: a metre for a metre per second."""
+    """The velocity by the flow, as an arrow from the vehicle: a metre for a metre per second."""
     arrows = flow_arrows(record)
     if arrows is None:
         return

@@ -18,8 +18,8 @@ from flownav.core.record import Record, mapping
 Outline = Array  # (n, 3) points of one line in body FRD [m]
 
 CIRCLE_POINTS = 48
-LONGEST_SIDE_M = 20.0  # of a vehicle that is drawn; what a damaged record says beyond is not
-OLDEST_RANGE_S = 0.5  # a range that came longer ago than this says nothing of the height now
+LONGEST_SIDE_M = 20.0  # of a vehicle that is drawn; a damaged record's numbers beyond are not
+OLDEST_RANGE_S = 0.5  # a range that came longer ago than this is no evidence on the height now
 
 
 class Camera(NamedTuple):
@@ -134,7 +134,7 @@ class FlowArrows(NamedTuple):
 
 
 def flow_arrows(record: Record) -> FlowArrows | None:
-    """The velocity that the flow says, row by row of `flow_rate` (with its gyro and `range`) or `flow_velocity`.
+    """The velocity by the flow, row by row of `flow_rate` (with its gyro and `range`) or `flow_velocity`.
 
     Rows of quality 0, without the sensor's gyro, or without a range of the last half second are NaN. None where the
     record holds neither table.

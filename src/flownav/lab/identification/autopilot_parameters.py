@@ -3,12 +3,12 @@
 Names that older firmware used are given in the comments: a ground station would refuse them on a newer one.
 
 A quantity that a log does not identify is not written: the file states this, and the vehicle keeps its own. The latency
-counts as identified where the verdict on the excitation says it, a gain where its own does and the model holds on
+counts as identified where the verdict on the excitation states it, a gain where its own does and the model holds on
 unseen data. A limit follows from a datasheet alone (`--base`): the fastest flow, the greatest height and the least
 quality of one flight are only those of that flight, and an autopilot refuses all flow beyond them.
 
 PX4's noise is an angular rate that runs from N_MIN at quality 255 to N_MAX at QMIN; ArduPilot's is one number. Neither
-knows height: the figure taken is the noise over height where it is worst, so the filter is never given less.
+depends on height: the figure taken is the noise over height where it is worst, so the filter is never given less.
 """
 
 import math

@@ -84,7 +84,7 @@ def one_axis(gain: float) -> Axes:
 
 # -- a flight judged ---------------------------------------------------------------------------------------------
 class Judged(NamedTuple):
-    """The flight, its motion by the reference, the flow's response to it (2, 2), and what that says of the axes."""
+    """The flight, its motion by the reference, the flow's response to it (2, 2), and the axes by that response."""
 
     flown: Flight
     moved: reference_motion.Motion

@@ -5,10 +5,10 @@ still jump: a sonar whose echo comes now from the ground, now from something els
 jump times their usual size over the range, is an error of every gain that the log shows, and no length of log takes it
 out.
 
-The sensor's velocity along body x and y comes from angular rates times range (`prepare` takes the rotation out),
-or as the sensor says it, in flight only. The reference is the log's truth (or visual odometry), GPS without one. The
-IMU's earth acceleration ties both to the vehicle's clock: it gives the flow's latency as an autopilot needs it, and
-shows swapped or inverted axes even where the reference's heading is unknown.
+The sensor's velocity along body x and y comes from angular rates times range (`prepare` takes the rotation out), or as
+the sensor reports it, in flight only. The reference is the log's truth (or visual odometry), GPS without one. The IMU's
+earth acceleration ties both to the vehicle's clock: it gives the flow's latency as an autopilot needs it, and shows
+swapped or inverted axes even where the reference's heading is unknown.
 """
 
 from dataclasses import dataclass

@@ -78,7 +78,7 @@ class QualityPoint(NamedTuple):
 
 
 class ScheduleScore(NamedTuple):
-    """How well a schedule of the variance tells a filter the error, on readings it was not fitted to."""
+    """How well a schedule of the variance describes the error to a filter, on readings it was not fitted to."""
 
     name: str
     score: float  # mean of log sigma + e^2/(2 sigma^2)

@@ -16,7 +16,7 @@ AUTOPILOTS = {"px4": ".params", "ardupilot": ".param", "inav": ".txt"}
 class Parameter(NamedTuple):
     """A name, its value in the autopilot's unit, its MAVLink type and where it comes from.
 
-    needed: the value that the log asks for, where the parameter's range does not reach so far; else None.
+    needed: the value that the log requires, where the parameter's range does not reach so far; else None.
     """
 
     name: str

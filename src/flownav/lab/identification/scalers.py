@@ -19,7 +19,7 @@ APART = 0.1  # of a gain: its axes and heights may differ by so much where one f
 
 
 def scalers(autopilot: str, findings: Findings) -> list[Parameter]:
-    """The factors that the log tells."""
+    """The factors that the log shows."""
     found = []
     for _, gain, parameter_of, doubts in _wanted(autopilot, findings):
         if gain is not None and not doubts:

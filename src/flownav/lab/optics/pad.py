@@ -139,7 +139,7 @@ class PadTarget(NamedTuple):
 
     @property
     def coded(self) -> bool:
-        """Whether the target tells its identity and which way it points."""
+        """Whether the target shows its identity and its heading."""
         return self.pattern in ("tag", "nested")
 
     @property

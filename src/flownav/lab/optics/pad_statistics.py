@@ -28,7 +28,7 @@ from flownav.lab.optics.pad_trial import TrialFrame
 LEAST_SHARE = 0.5  # of the frames with the whole pad in view: heights that give fewer fixes are out of range
 LEAST_FRAMES = 5
 EASY_RATE_RAD_S, EASY_PART = 1.75, 0.75
-SHARE_FLOOR = 1e-3  # of missed frames: fewer than that nobody measures with some thousand frames
+SHARE_FLOOR = 1e-3  # of missed frames: fewer cannot be measured with some thousand frames
 UNLIKELY_PROBABILITY = 0.01
 REACH_STEP = 1.2
 FIT_PASSES = 3
@@ -202,7 +202,7 @@ def missed_law(c: dict[str, Array], max_height_m: float) -> MissedLaw:
 
     def cost(p: Array) -> float:
         chance = np.clip(probabilities(p), 1e-6, 1.0 - 1e-6)
-        unlikely = 1e-3 * float((p[1:] ** 2).sum() + (p[0] - 2.0) ** 2)  # holds what no frame tells
+        unlikely = 1e-3 * float((p[1:] ** 2).sum() + (p[0] - 2.0) ** 2)  # holds numbers that no frame shows
         return -float((lost * np.log(chance) + (1.0 - lost) * np.log(1.0 - chance)).mean()) + 1e-2 * unlikely
 
     best = minimize(cost, np.array([2.5, 0.0, -1.0]), method="Nelder-Mead", options={"maxiter": 4000}).x

@@ -245,7 +245,7 @@ GLIDE_M_S, FLARE_1_S, FLARE_RAD = 4.0, 1.3, 0.12
 
 @equation
 def powerless(known: Knowledge) -> bool:
-    """The motor gives nothing: what the rotor's turning still holds must do for the landing."""
+    """The motor gives nothing: the energy of the turning rotor must do for the landing."""
     return known.powerless_s > FELT_S
 
 
@@ -263,7 +263,7 @@ BLIND_M_S = 0.5  # chosen: what the range sensor's 3.5 m and the heave loop stop
 
 @equation
 def sunk(vel_d: float, known: Knowledge, contact_time_s: float, landing: bool, gains: AutopilotGains) -> float:
-    """Velocity down [m/s] of a landing that knows no height: on down, whatever GPS says of it, until a range finds the
+    """Velocity down [m/s] of a landing that knows no height: on down, without regard to GPS, until a range finds the
     ground; and with weight on its skids, that a gate or a wrong height does not lift it again.
     """
     blind = landing and known.ground_found == 0.0 and gains.search_height_m > 0.0

@@ -1,5 +1,5 @@
-"""Limits on what a run may read and where it may write: no output is ever an input, a link, a device or somebody else's
-file.
+"""Limits on what a run may read and where it may write: no output is ever an input, a link, a device or a file that
+flownav did not write.
 
 Readers pass every path through `an_input` before they open it. What a user named to be written is written with the
 `written_whole` of this file, which passes it through `an_output`. Within `a_run` (the command line's is one) what was

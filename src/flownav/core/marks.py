@@ -1,4 +1,5 @@
-"""By what a file is known as flownav's, so that it may be replaced: a mark at a fixed place that nobody else writes.
+"""By what a file is known as flownav's, so that it may be replaced: a mark at a fixed place that no other program
+writes.
 
 A text begins with a line that has the SHA-256 of all that follows, so that one which was edited is no longer ours: who
 edits a file has made it. JSON has no comments: there the digest is a key. EuRoC's tables begin with their columns'

@@ -70,7 +70,7 @@ def size_of(information: float, score: float, prior_sigma: float) -> Size:
 
 @equation
 def followed(work: Work, lanes: Lanes) -> int:
-    """How many columns follow faults: COUNT and what they left, or 0."""
+    """How many columns follow faults: COUNT and those of left effects, or 0."""
     return int(work[HYPOTHESES * len(lanes)])
 
 

@@ -49,8 +49,8 @@ def judge_baro(
 
 @equation
 def consider_height(work: Work, lanes: Lanes) -> None:
-    """Pressure is no judge of the height of a vehicle that stands, or not yet known to stand or to fly: it settles then
-    what the barometer's offset is. One that began 10 m wrong had lifted a vehicle off its pad before the first window
+    """Pressure is no judge of the height of a vehicle that stands, or not yet known to stand or to fly: it determines
+    the barometer's offset then. One that began 10 m wrong had lifted a vehicle off its pad before the first window
     ended.
     """
     consider(work, lanes, POSITION + 2, GROUNDED)

@@ -60,7 +60,7 @@ def with_change(reading: Reading, t_s: float, m: PushMemory) -> PushMemory:
 
 @equation
 def faded(t_s: float, m: CourseMemory) -> CourseMemory:
-    """The sums of the course, of which what is long ago counts less."""
+    """The sums of the course, with less weight on older ones."""
     kept = exp(-smaller(t_s - m.gps_s, FADING_S) / FADING_S)
     return with_sums(m, along=kept * m.along, across=kept * m.across, gps=kept * m.gps, flow=kept * m.flow)
 

@@ -65,7 +65,7 @@ with_verdict = replacing(FlowMemory, "taken_s", "doubted", "wrong_s", "usual")
 
 # -- one component ------------------------------------------------------------------------------------------
 class FlowOffer(NamedTuple):
-    """A component of flow: what is offered, what its law is held against, and the gyro's bias in that."""
+    """A component of flow: the offer, the value that its law is compared with, and the gyro's bias in that."""
 
     offer: Offer
     measured: Measured
@@ -142,7 +142,7 @@ class Freed(NamedTuple):
 def free_velocity(
     tested: Tested, look: Look, gps: GpsMemory, before: FlowInnovation, m: FlowMemory, *, t_s: float, angular: bool
 ) -> Freed:
-    """Flow that is refused again and again, and no other sensor measures the velocity: then that is what is wrong."""
+    """Doubts that free the velocity where flow is refused again and again and no other sensor measures it."""
     refused = tested.reason == INNOVATION_GATE
     again = tested.innovation * before.innovation > 0.0  # spikes are not alike
     freed = refused and m.ratio > DOUBTED_RATIO and not holds(gps, t_s) and again

@@ -121,7 +121,7 @@ def lasting_doubt(doubted: float, ratio: float) -> float:
 @equation
 def alike(innovation: float, before: float, total: float) -> float:
     """The product of two innovations of a component, one after the other, over their variance: 0 on average for noise
-    of any size, 1 and more for what is wrong in the same way. None counts as more than 2.5 standard deviations.
+    of any size, 1 and more for innovations with the same error. None counts as more than 2.5 standard deviations.
     """
     limit = np.sqrt(LARGEST_CHANGE * total)
     return clamp(innovation, -limit, limit) * clamp(before, -limit, limit) / total

@@ -123,7 +123,9 @@ def follow_fix_noise(
     tested: Tested, start: StartMemory, steady: SteadyForce, m: NoiseMemory,
     *, t_s: float, place: int, s: GpsSettings,
 ) -> NoiseMemory:  # fmt: skip
-    """After the test: an axis that was fused teaches its white noise; what a lag leaves over lasts, and is none."""
+    """After the test: an axis that was fused teaches its white noise; the rest of a lag lasts, and is no white
+    noise.
+    """
     if tested.reason != FUSED:
         return m
     white = tested.variance - (0.0 if place < OF_GPS + 3 else lag_variance(start, steady, s))

@@ -65,7 +65,7 @@ def offered_heading(
 
 
 class Weighed(NamedTuple):
-    """A heading that was held against its gate: its fate, the variance to fuse it with, and what is doubted."""
+    """A heading tested by its gate: its fate, the variance to fuse it with, and the doubts."""
 
     fate: Fate
     noise: Noise

@@ -87,7 +87,7 @@ def range_variance(range_m: float, sigma_m: float, relative_sigma: float) -> flo
 
 @equation
 def repeated_variance(variance: float, lasting_s: float) -> float:
-    """Variance of a range [m2] that has been the same to the last digit for so long: what may have gone unseen."""
+    """Variance of a range [m2] that has repeated one value for lasting_s, with the change that may be undetected."""
     unseen_m = UNSEEN_M_S * lasting_s
     return variance + unseen_m * unseen_m
 
@@ -115,7 +115,7 @@ def repeats(t_s: float, m: RangeMemory, height: Height, alone: bool, s: HeightSe
 def range_verdict(
     reading: Reading, t_s: float, started: float, height: Height, alone: bool, m: RangeMemory, s: HeightSettings
 ) -> tuple[int, float, RangeMemory]:
-    """Verdict, variance and what is remembered of one range [m] along the boresight."""
+    """Verdict, variance and memory of one range [m] along the boresight."""
     range_m = reading.value_0
     stated = reading.variance_0
     variance = stated if np.isfinite(stated) else range_variance(range_m, s.range_sigma_m, s.range_relative_sigma)

@@ -1,4 +1,4 @@
-"""Offering one component to the filter on lanes: the test, what is written of it, and what follows for the aids."""
+"""Offering one component to the filter on lanes: the test, the row written of it, and its effect on the aids."""
 
 from typing import NamedTuple
 
@@ -73,7 +73,7 @@ def too_old(work: Work, lanes: Lanes, t_s: float, sensor: int, o: Output) -> boo
 # -- one component ----------------------------------------------------------------------------------------
 @on_lanes
 def observe_innovation(tested: Tested) -> Observation:
-    """The difference that a law finds is what is written down of an attitude."""
+    """Write the difference that a law finds as the observation of an attitude."""
     return Observation(tested.innovation)
 
 
@@ -95,7 +95,7 @@ def offer_what_is_sound(fate: Fate) -> Offered:
 
 @on_lanes
 def note_refusal(fate: Fate, tested: Accepted) -> Fate:
-    """INNOVATION_GATE where what was offered was not fused."""
+    """INNOVATION_GATE where the offer was not fused."""
     return Fate(INNOVATION_GATE if fate.reason == FUSED and tested.accepted == 0.0 else fate.reason)
 
 
@@ -114,7 +114,7 @@ def fuse_offered(work: Work, lanes: Lanes, gate_sigma: float, o: Output) -> None
 # -- a place as a whole -----------------------------------------------------------------------------------
 @equation
 def gate_ratio(tested: Tested, gate_sigma: float) -> float:
-    """The square of the innovation over what the gate lets pass."""
+    """The square of the innovation over the largest that the gate passes."""
     return tested.innovation * tested.innovation / (gate_sigma * gate_sigma * tested.total)
 
 

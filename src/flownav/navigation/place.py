@@ -183,8 +183,8 @@ def judge_sight(
     reading: Reading, start: StartMemory, velocity: VelocityNed, m: ImuMemory, fix: LevelMemory,
     *, component: int, alone: bool, s: PlaceSettings,
 ) -> PadOffer:  # fmt: skip
-    """One component of a pad fix. All three are judged together: what is not the pad may lie in line with it along one
-    of them, and there its lever would turn the heading. alone: without regard to the others.
+    """One component of a pad fix. All three are judged together: an object that is not the pad may lie in line with it
+    along one of them, and there its lever would turn the heading. alone: without regard to the others.
     """
     reason, fixed = judge_pad(reading, component, start.started, s)
     variance = fixed + late_variance(velocity, m, reading.value_2, component, s)

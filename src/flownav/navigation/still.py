@@ -1,4 +1,5 @@
-"""A vehicle that stands: found from what its IMU, range, flow and GPS read over a window, and what standing teaches.
+"""A vehicle that stands: detected from the readings of its IMU, range, flow and GPS over a window, and the biases
+learnt while it stands.
 
 With its motors off an IMU is quieter than in any flight, and its gyro then reads nothing but its bias. With them
 running it is not, but a vehicle whose range reads what it reads on the ground, and does not change, while the flow
@@ -113,7 +114,7 @@ def is_down(m: StandMemory, seen: SeenWindow) -> bool:
 
 
 class Rest(NamedTuple):
-    """A velocity of 0, what is doubted before it is offered, and whether the accelerometer is."""
+    """A velocity of 0, the doubts before it is offered, and whether the accelerometer is doubted."""
 
     velocity: Doubt
     accel: tuple[Doubt, Doubt, Doubt]
@@ -126,9 +127,9 @@ def offer_rest(
     start: StartMemory, seen: SeenWindow, m: StandMemory, velocity: AxisVelocity, imu: ImuMemory, *, axis: int,
     s: PlaceSettings,
 ) -> Rest:  # fmt: skip
-    """No velocity along an axis, for the next HOLD_S of a stand, and little of one that slides on the ground. One that
-    the gate would not let go of a vehicle that touches the ground is what is wrong, and so is the accelerometer that
-    made it.
+    """No velocity along an axis, for the next HOLD_S of a stand, and little of one that slides on the ground. A
+    velocity that the gate would not allow of a vehicle that touches the ground is wrong, and so is the accelerometer
+    that made it.
     """
     touching = touches(m, seen)
     level = axis < 2 and touching  # a range that is stuck in descent looks like standing
@@ -200,7 +201,9 @@ def stands_still(start: StartMemory, seen: SeenWindow, m: StandMemory) -> Anywhe
 
 @procedure
 def stand_still(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) -> None:
-    """At the end of a window: what the vehicle does, and what that teaches; on the way a stand is held to be one."""
+    """At the end of a window, judge the state of motion and learn from it; within the window a stand is held to be
+    one.
+    """
     ended = hold_stand(work, lanes, t_s, p, o)
     if ended > 0.0:
         close_window(work, lanes, ended, t_s, p, o)

@@ -1,4 +1,4 @@
-"""Which fault is suspected, and what is remembered of those that are sought anew.
+"""Which fault is suspected, and the memory of those that are sought anew.
 
 Faults that are there or are not are sought until innovations exclude them; those that last, in windows.
 """
@@ -61,7 +61,7 @@ def leave_over(work: Work, lanes: Lanes, lane: int, moved_m: float) -> None:
 
 @equation
 def seek_anew(work: Work, lanes: Lanes, fault: int, lane: int, drifted_s: float) -> None:
-    """A fault that lasts is sought from now on; what it did until now, by its size, stays where it is.
+    """A fault that lasts is sought from now on; its effect until now, by its size, stays.
 
     Of a drift of GPS, its reading stays off by what it drifted since the search began.
     """
@@ -76,7 +76,7 @@ def seek_anew(work: Work, lanes: Lanes, fault: int, lane: int, drifted_s: float)
 
 @procedure
 def seek_windows_anew(work: Work, lanes: Lanes, t_s: float) -> None:
-    """Faults that last are sought in windows: drifts of GPS, and what is wrong with the IMU."""
+    """Faults that last are sought in windows: drifts of GPS, and errors of the IMU."""
     since_s = shared(work, lanes, DRIFT_SINCE)
     if t_s - since_s > WINDOW_S:
         share(work, lanes, DRIFT_SINCE, t_s)

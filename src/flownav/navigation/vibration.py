@@ -146,7 +146,8 @@ class Shaken(NamedTuple):
 def add_vibration_noise(
     m: ImuMemory, start: StartMemory, step: MotionStep, factor: AccelFactors, *, dt_s: float, s: ImuSettings
 ) -> Shaken:
-    """Velocity and accelerometer bias are less sure by what vibration, or what is doubted, may have made of them.
+    """Doubts of velocity and accelerometer bias by the errors that vibration, or a doubted accelerometer, may have
+    caused.
 
     Vibration is rectified: an accelerometer that comes to be shaken more, as rotors spin up, may err by so much more.
     Only in lanes that the IMU moves.

@@ -152,7 +152,7 @@ class Ensemble:
         return np.array([drawn(entry.mode, float(draw), told, below, above) for draw in draws])
 
     def _truth(self, flight: int, values: Mapping[str, float]) -> Truth:
-        """One flight's truth: what the drawn numbers touch is built anew, the rest is what is believed."""
+        """One flight's truth: parts that the drawn numbers touch are built anew, the rest is as believed."""
         touched: dict[str, dict[str, float]] = {}
         for name, value in values.items():
             source, _, key = name.partition(".")
@@ -190,7 +190,7 @@ class Ensemble:
         return PUNCTUAL._replace(**late)
 
     def _carried(self, name: str) -> bool:
-        """Whether the vehicle has what an entry is of; what another kind has, or a known sensor, is passed over."""
+        """Whether the vehicle has the part of an entry; a part of another kind, or a known sensor, is passed over."""
         source = name.partition(".")[0]
         if source == "vehicle" and name.split(".")[1] in OF_A_KIND - set(self.contents["vehicle"]):
             return False

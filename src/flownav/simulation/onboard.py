@@ -1,4 +1,4 @@
-"""The sensors that a vehicle carries for its navigator: coefficients, clocks and places, and what they look at.
+"""The sensors that a vehicle carries for its navigator: coefficients, clocks and places, and the ground below.
 
 Last: datasheets as a scenario wants them, its own figures above the files', at rates that the simulator's clock has.
 """
@@ -74,7 +74,9 @@ def without(onboard: Onboard, *names: str) -> Onboard:
 
 @equation
 def earlier(state: HelicopterState, late_s: float) -> HelicopterState:
-    """The state with the position that it had `late_s` ago, at the velocity of now: what a late reading shows."""
+    """The state with the position that it had `late_s` ago, at the velocity of now: the position that a late reading
+    shows.
+    """
     rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
     vel_n, vel_e, vel_d = to_earth(rotation, state.u, state.v, state.w)
     return HelicopterState(

@@ -60,7 +60,7 @@ def starts_of(flight: Flight) -> list[Start]:
 
 
 def _units(s: Onboard) -> list[tuple[str, Any, int]]:
-    """The units that the vehicle carries: what each is, and how it starts."""
+    """The units that the vehicle carries: the drawn errors of each, and its start."""
     return [
         (sensor.name, record, rows[sensor.name])
         for sensor in fitted_to(s)

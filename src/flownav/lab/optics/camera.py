@@ -144,7 +144,7 @@ class Lens(NamedTuple):
 
 
 class Calibration(NamedTuple):
-    """How far off what a detector believes of its lens is, one standard deviation each."""
+    """Errors of a detector's calibration of its lens, one standard deviation each."""
 
     focal_share: float = 0.003
     centre_px: float = 1.0

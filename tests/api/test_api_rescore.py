@@ -225,5 +225,5 @@ def test_what_holds_nothing_to_score_against_is_said_in_one_line(replayed):
     del old.tables["judging"]
     with pytest.raises(InputError, match="fly it again with this flownav"):
         old.score()
-    with pytest.raises(InputError, match="only a simulated flight is handed over"):
+    with pytest.raises(InputError, match="only a simulated flight has a handover"):
         replayed.rescore(estimate=replayed.estimate, from_handover=True)

@@ -261,4 +261,4 @@ def test_a_digest_of_more_readings_than_there_are(record, tmp_path):
     (tmp_path / "said.txt").write_text("999999 0123456789abcdef\n")
     done = run("verify", tmp_path / "said.txt", record)
     assert done.returncode == 2
-    assert "a digest is said of 999999 readings, and the flight has" in " ".join(done.stderr.split())
+    assert "a digest is reported after 999999 readings, and the flight has" in " ".join(done.stderr.split())

@@ -43,7 +43,7 @@ class HostedDevice:
         return with_arrays(value, np.copy)
 
     def new(self, shape: Any, dtype: Any) -> Any:
-        """A new array, full of what nobody should read."""
+        """A new array, filled with poison values."""
         return np.full(shape, np.nan if np.issubdtype(dtype, np.floating) else 77, dtype)
 
     def fetch(self, array: Any) -> Any:

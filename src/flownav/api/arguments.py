@@ -19,7 +19,7 @@ WORDS = {str: "text", Path: "a path", int: "a whole number", float: "a number", 
 
 
 def checked(function: Callable[P, R]) -> Callable[P, R]:
-    """The function; what it is given is held against its annotations first. InputError says what is needed.
+    """The function, whose arguments are checked against its annotations first. InputError says what is needed.
 
     Numbers, texts, paths, lists, mappings, functions and classes are judged; what else an annotation names, a protocol
     of a part of one's own for one, is the function's to judge.

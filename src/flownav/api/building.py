@@ -1,4 +1,4 @@
-"""build and verify: the navigator as a library for other processors, and what it says there held against replay."""
+"""build and verify: the navigator as a library for other processors, and its output there compared with replay."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -32,7 +32,7 @@ def build(
     features: str = "",
     force: bool = False,
 ) -> dict[str, Any]:
-    """Write the navigator for a processor into a new folder `out`, and say what it is.
+    """Write the navigator for a processor into a new folder `out`; return its facts.
 
     target: linux-x86_64, linux-aarch64, cortex-m7, wasm32, or a triple that LLVM knows, with its cpu and features.
     record: a record or log of a flight whose settings and sensors it is built for, and whose first readings become
@@ -77,7 +77,7 @@ def _check(horizon_s: float, imu_hz: float | None, others_hz: float | None) -> N
 
 
 def _rates(flight: "Flight", horizon_s: float, imu_hz: float | None = None, others_hz: float | None = None) -> "Rates":
-    """What there must be room for: what is asked for, else what the flight has."""
+    """Capacity of the rings: the rates that are asked for, else those of the flight."""
     from flownav.export.onboard.package import rates_of
 
     found = rates_of(flight.segment, horizon_s)
@@ -117,7 +117,7 @@ def flight_of(
 
 @checked
 def verify(what: str | Path, record: str | Path | None = None, *, horizon_s: float | None = None) -> dict[str, Any]:
-    """Hold what a board or a browser says against the same flight computed here.
+    """Compare the output of a board or a browser with the same flight computed here.
 
     what: a digest, a file of lines (readings, digest), or a folder of `build`, whose files are looked at, too. record:
     the record or log of the flight; the shipped one where none is given. horizon_s: that of the board, of a digest.
@@ -152,7 +152,7 @@ def verify(what: str | Path, record: str | Path | None = None, *, horizon_s: flo
 
 
 def _told(what: str, found: "Found", changed: list[str]) -> dict[str, Any]:
-    """What came of a comparison, as facts."""
+    """Facts of a comparison, as a dictionary."""
     facts = found._asdict()
     equal_digests = facts.pop("equal")
     return {

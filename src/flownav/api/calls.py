@@ -1,4 +1,6 @@
-"""What calls of the API share: how one is written down, parts of one's own, entries of files and their changes."""
+"""Helpers that calls of the API share: a call in Python's notation, parts of one's own, entries of files and their
+changes.
+"""
 
 import atexit
 import hashlib
@@ -25,7 +27,7 @@ LONGEST_ARGUMENT = 200  # characters of one argument
 def call_of(name: str, *arguments: Any, **options: Any) -> str:
     """A call as Python writes it, for the record's "how to reproduce"; what is None or empty is left out.
 
-    Options that stand as the function has them unless told otherwise are left out by `changed`.
+    Options with the function's default value are left out by `changed`.
     """
     given = [_shown(argument) for argument in arguments]
     empty = {key for key, value in options.items() if isinstance(value, tuple | list | dict) and not value}
@@ -55,7 +57,8 @@ def require_from(name: str, value: int, low: int, high: int) -> None:
 
 
 def split(filter: Any, sensors: Sequence[Any], vehicle: Any, controller: Any) -> tuple[Parts, str | None, Any]:
-    """What is somebody else's, and the names of filter and vehicle that are the scenario's (None where they are not).
+    """The parts that are not flownav's, and the names of filter and vehicle that are the scenario's (None where they
+    are not).
 
     A filter by another name than ours is an entry point's or a file's. InputError where an object is no such part.
     """

@@ -31,8 +31,8 @@ SHOWN = ("r95_m", "landed", "p95_axis_m")
 class Campaign:
     """Many flights of one scenario or more, cell by cell: a cell is a scenario at one combination of swept values.
 
-    plan: what was asked for. folder: where the flights lie. summary: every figure with its interval, as summary.json
-    has it. rate_per_s: flights a second, None where none was missing. records: of flights that were kept.
+    plan: the request. folder: where the flights lie. summary: every figure with its interval, as summary.json has it.
+    rate_per_s: flights a second, None where none was missing. records: of flights that were kept.
 
     Example:
         >>> import flownav

@@ -58,17 +58,17 @@ def campaign(
     progress: Watch | None = None,
     **changes: Any,
 ) -> Campaign:
-    """Fly a scenario many times, and say how well with intervals.
+    """Fly a scenario many times; return the results with intervals.
 
     scenario: one, or several. flights: of each cell, 1000 if not given; with `until` the most, then 100000. seed:
     flight k of a seed is always the same flight. sweep: every value of numbers of the scenario by their dotted names.
-    sampling: plain, latin or sobol. truth_model: ensemble (each flight's truth is drawn), matched (as the filter is
-    told) or both. until: when to stop, such as "r95_m width <= 0.005". engine: local, ray (a cluster) or cuda (a GPU).
-    folder: where the flights are kept, and where a campaign that was stopped goes on; None keeps them for as long as
-    the result lives. records: write records and reports of so many of the worst flights into the folder. progress:
+    sampling: plain, latin or sobol. truth_model: ensemble (each flight's truth is drawn), matched (as the filter
+    assumes) or both. until: when to stop, such as "r95_m width <= 0.005". engine: local, ray (a cluster) or cuda (a
+    GPU). folder: where the flights are kept, and where a campaign that was stopped goes on; None keeps them for as long
+    as the result lives. records: write records and reports of this many of the worst flights into the folder. progress:
     called with `campaigns.run.Progress` as flights land. filter, sensors, vehicle, controller, changes: as `fly`; with
-    parts of your own flights are flown one after the other, by this process.
-    InputError, one line, for a name, a key or a value that cannot be.
+    parts of your own flights are flown one after the other, by this process. InputError, one line, for a name, a key or
+    a value that cannot be.
 
     Example:
         >>> import flownav
@@ -104,7 +104,7 @@ def campaign(
 
 
 def _fly_for_now(plan: Plan, engine: Engine, records: int, watch: Watch | None) -> Campaign:
-    """Fly into a folder that goes when nobody holds the result any more."""
+    """Fly into a folder that is removed when the result is no longer used."""
     folder = Path(mkdtemp(prefix="flownav-campaign-"))
     try:
         found = fly_plan(plan, engine, folder, records=records, watch=watch, page=False)
@@ -215,7 +215,9 @@ FLIGHT, FOUND = "rare_flight.json", "rare.json"
 
 @dataclass(frozen=True)
 class RareEvent:
-    """What was found, as rare.json has it, how many flights a second, and where the most likely flight lies."""
+    """A rare event's figures, as rare.json has them, the number of flights a second, and where the most likely flight
+    lies.
+    """
 
     facts: dict[str, Any]
     rate_per_s: float

@@ -123,7 +123,7 @@ def fly_setup(
 
 
 def _get_ready_to_save() -> None:
-    """What scoring and saving a flight load: a second, which a first flight has while it waits for a kernel."""
+    """Load the modules that score and save a flight: a second, which a first flight has while it waits for a kernel."""
     import flownav.report.html  # noqa: F401
 
     load_kernel()
@@ -131,7 +131,7 @@ def _get_ready_to_save() -> None:
 
 
 def _facts(setup: Setup, seed: int, flights: int, *, dispersed: bool) -> dict[str, Any]:
-    """What is flown."""
+    """Facts of the flights: scenario, filter, truth model and seed."""
     scenario = setup.scenario
     return {
         "scenario": scenario.name,
@@ -147,7 +147,7 @@ def _facts(setup: Setup, seed: int, flights: int, *, dispersed: bool) -> dict[st
 
 
 def _nothing_of_many(setup: Setup) -> dict[str, Any]:
-    """What the navigator is given, and no figures of many flights."""
+    """The list of what the navigator is given exactly, with figures of many flights left empty."""
     if setup.fitted is None:
         return {}
     return {"known_exactly": known_exactly(setup.scenario), **dict.fromkeys(OF_MANY_FLIGHTS)}
@@ -177,7 +177,7 @@ def _fly_parts(
     setup: Setup, parts: Parts, seed: int, first: int, flights: int, truths: Ensemble | None, facts: dict[str, Any],
     advance: Progress,
 ) -> Flights:  # fmt: skip
-    """Flights with parts of somebody else's, one after the other; the record of the median one."""
+    """Flights with a user's own parts, one after the other; the record of the median one."""
     rows = []
     for index in range(first, first + flights) if flights > 1 else ():
         flown = fly_parts(setup, parts, seed, index, truths, written=False)
@@ -211,10 +211,10 @@ def _fly_pixels(
 
 
 def tell(setup: Setup, record: Record, url: str, speed: float, key: Path | None) -> dict[str, Any]:
-    """Tell a flight of `setup` over MAVLink, as an autopilot would; how far it came, and what was heard.
+    """Send a flight of `setup` over MAVLink, as an autopilot would; return how far it came, and the messages received.
 
-    speed: 1 is real time. key: a file that signs what is told. InputError where the flight has no sensors of its own,
-    or the link cannot be opened.
+    speed: 1 is real time. key: a file whose key signs the messages. InputError where the flight has no sensors of its
+    own, or the link cannot be opened.
     """
     from flownav.campaigns.faults.table import log_of
     from flownav.live.byte_links import open_link

@@ -29,10 +29,10 @@ def identify(
 ) -> Sensor:
     """Identify a flow sensor: gain, latency, dynamics and noise, each with its 95 % interval.
 
-    logs: rig logs (folders or CSV files), taken together, or one flight log. order: auto, delay (gain and latency),
-    1 to 6, or such as "2+delay". heights_m: the sensor's height over the rig, one for all logs or one each.
-    reference: auto; velocity or encoder of a rig, truth or gps of a flight. flow_instance: which of a flight's several
-    flow sensors. base: the sensor file for what no log tells (optics, limits); the paper's where it is None.
+    logs: rig logs (folders or CSV files), taken together, or one flight log. order: auto, delay (gain and latency), 1
+    to 6, or such as "2+delay". heights_m: the sensor's height over the rig, one for all logs or one each. reference:
+    auto; velocity or encoder of a rig, truth or gps of a flight. flow_instance: which of a flight's several flow
+    sensors. base: the sensor file for numbers that no log shows (optics, limits); the paper's where it is None.
     InputError, one line, where a log is missing, mixed with another kind or cannot serve.
 
     Example:

@@ -138,7 +138,7 @@ def _paths(record: Record) -> tuple[tuple[str, str], ...]:
 def _scored(record: Record, t_s: Array) -> NDArray[np.bool_]:
     """Which instants (n,) of a simulated flight count in its scores; all of another record.
 
-    Before the hand-over the estimate is the truth, and on the ground nothing is flown on it.
+    Before the hand-over the estimate is the truth, and on the ground no autopilot uses it.
     """
     judged = record.tables.get("judging", {})
     if "counted" not in judged:
@@ -166,7 +166,7 @@ def _matrix(table: Mapping[str, Column], columns: Sequence[str]) -> Array:
 def _stack(
     record: Record, what: str, titles: Sequence[str], columns: tuple[str, ...], sources: Sequence[tuple[str, str]]
 ) -> Any:
-    """What these tables say of some states, GPS as dots. InputError where none says anything."""
+    """Plot of some states from these tables, GPS as dots. InputError where no table has any."""
     lines = [_line(record, table, name, columns, dots=name == "GPS") for table, name in sources]
     known = [line for line in lines if line is not None]
     if not known:
@@ -204,7 +204,7 @@ def _trace(figure: Any, row: int, name: str, t_s: Array, values: Array, *, dots:
 
 
 def _band(figure: Any, row: int, t_s: Array, half: Array) -> None:
-    """What is stated, about zero."""
+    """Add the stated band about zero."""
     known = np.isfinite(half)
     around = np.concatenate([half[known], -half[known][::-1]])
     first = all(trace.name != STATED for trace in figure.data)
@@ -216,7 +216,7 @@ def _band(figure: Any, row: int, t_s: Array, half: Array) -> None:
 
 
 def lines_of(record: Record) -> list[str]:
-    """What flew and how it went; what the record holds."""
+    """Text lines of a record: what flew, its result, and its tables."""
     names, rows = list(record.tables), len(next(iter(record.tables.values()), {}).get("t_s", ()))
     some = f" ({', '.join(names[:5])}{', ...' if len(names) > 5 else ''})" if names else ""
     return [
@@ -226,7 +226,7 @@ def lines_of(record: Record) -> list[str]:
 
 
 def what_of(record: Record) -> str:
-    """What flew, with which filter, how long."""
+    """Title of a record: kind, scenario or log, filter, and duration."""
     facts = record.manifest
     source = facts.get("scenario") or facts.get("log") or facts.get("kind") or "nothing"
     seed = f", seed {facts['seed']} flight {facts.get('flight', 0)}" if "seed" in facts else ""

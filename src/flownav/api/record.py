@@ -76,7 +76,7 @@ class Record(ground.Record):
     # -- scores --------------------------------------------------------------------------------------------------
     @property
     def name(self) -> str:
-        """What it is called after: its scenario, or its log without the suffix.
+        """The record's name: its scenario, or its log without the suffix.
 
         Example:
             >>> flownav.fly("landing", flight={"duration_s": 6.0}).name
@@ -86,7 +86,7 @@ class Record(ground.Record):
 
     @property
     def scores(self) -> dict[str, Any]:
-        """What scoring found when it flew: the figures that `--json` prints; empty of a live session.
+        """Scores from when it flew: the figures that `--json` prints; empty of a live session.
 
         Example:
             >>> flownav.fly("landing", seed=1).scores["touchdown"]["contact"]["distance_m"] < 1.0
@@ -116,12 +116,12 @@ class Record(ground.Record):
         vel_n_m_s, vel_e_m_s, vel_d_m_s), qw, qx, qy, qz, and the standard deviations and protection levels of
         `record.TABLES["estimate"]` where it has them. Scores of what it lacks are None.
 
-        A simulated flight's estimate is held against the truth, at the truth's instants: errors, and the touchdown as
-        it would be put down to estimate, guidance and pad. The navigator flies on its estimate carried on to now and
-        counted from where it has the pad, which is `record.flown` and what `scores` score; from_handover counts
-        the other one likewise, from where it has the vehicle when the flight is handed over to the filter. A replay's
-        estimate is held against the log's GPS and its outages, and against its truth, turned and shifted onto it.
-        InputError, one line, for what is missing, and for wrong units, shapes and times.
+        A simulated flight's estimate is compared with the truth, at the truth's instants: errors, and the touchdown as
+        it would be put down to estimate, guidance and pad. The autopilot uses the navigator's estimate carried on to
+        now and counted from where it has the pad, which is `record.flown` and which `scores` score; from_handover
+        counts the other one likewise, from where it has the vehicle at the handover to the filter. A replay's estimate
+        is compared with the log's GPS and its outages, and with its truth, turned and shifted onto it. InputError, one
+        line, for what is missing, and for wrong units, shapes and times.
 
         Example:
             >>> record = flownav.fly("landing", seed=1)
@@ -138,10 +138,10 @@ class Record(ground.Record):
 
     @property
     def verdict(self) -> str:
-        """What is wrong with the flight or its log, in one line; "" where nothing is.
+        """Verdict on the flight or its log, in one line; "" where nothing is wrong.
 
-        Of a simulated flight: what it crashed on. Of a replay: that the flow itself is wrong, or that a horizontal
-        sensor was heard and never fused.
+        Of a simulated flight: the limit that it crashed on. Of a replay: that the flow itself is wrong, or that a
+        horizontal sensor was received and never fused.
 
         Example:
             >>> flownav.fly("landing", flight={"duration_s": 6.0}).verdict

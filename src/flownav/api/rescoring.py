@@ -22,7 +22,7 @@ from flownav.scoring.recorded import at_instants, scores_of_other
 
 KNOWN = ("t_s", *TABLES["estimate"], *VELOCITY_NED)
 NEEDED = ("t_s", *POSITION_NED)
-COLUMN_GROUPS = (VELOCITY_BODY, QUATERNION, VELOCITY_NED, PROTECTION_LEVELS)  # columns that say nothing one by one
+COLUMN_GROUPS = (VELOCITY_BODY, QUATERNION, VELOCITY_NED, PROTECTION_LEVELS)  # columns that have no meaning one by one
 MOST_FLIGHT_LENGTHS = 100.0  # times the flight: such an estimate counts other seconds
 UNIT_LENGTH = (0.9, 1.1)  # of a quaternion
 
@@ -132,7 +132,7 @@ def _missing(names: tuple[str, ...], columns: Mapping[str, Array]) -> str:
 # tables that our filter wrote, or that lie in the frame of its estimate
 OURS = ("states", "innovation", "consistency", "smoothed", "flown", "fed", "autopilot", "estimate")
 KINDS = ("fly", "replay")
-WHOLE_SHARE = 0.99  # of the instants that are scored: an estimate that covers less is said to
+WHOLE_SHARE = 0.99  # of the instants that are scored: an estimate that covers less is reported
 
 
 def rescored(record: Record, estimate: object, name: str, *, from_handover: bool) -> Record:
@@ -157,9 +157,9 @@ def rescored(record: Record, estimate: object, name: str, *, from_handover: bool
 
 
 def _covered(record: Record, columns: Table) -> float:
-    """The share of the instants that are scored (of a replay, of our estimate's) at which the other says a position.
+    """The share of the instants that are scored (of a replay, of our estimate's) at which the other has a position.
 
-    InputError where it says none at any of them.
+    InputError where it has none at any of them.
     """
     judged = record.tables.get("judging") if record.manifest["kind"] == "fly" else None
     t_s = np.asarray(record.tables["truth" if judged is not None else "estimate"]["t_s"], float)
@@ -184,14 +184,14 @@ def _span(record: Record) -> tuple[float, float]:
 
 
 def _from_handover(record: Record, columns: dict[str, Array]) -> dict[str, Array]:
-    """The estimate less its error in place at the last instant before the flight was handed over to the filter."""
+    """The estimate less its error in place at the last instant before the flight's handover to the filter."""
     facts, truth = record.manifest.get("judging") or {}, record.tables.get("truth")
     if "handover_s" not in facts or truth is None:
-        raise InputError("from_handover: only a simulated flight is handed over; leave it out")
+        raise InputError("from_handover: only a simulated flight has a handover; leave it out")
     before = np.flatnonzero(np.asarray(truth["t_s"], float) < facts["handover_s"])
     row = before[-1:] if len(before) else np.zeros(1, int)
     t_s = np.asarray(truth["t_s"], float)[row]
     error = at_instants(columns, POSITION_NED, t_s)[0] - columns_of(truth, POSITION_NED)[row[0]]
     if not np.isfinite(error).all():
-        raise InputError(f"from_handover: the estimate says nothing at {t_s[0]:g} s, when the flight is handed over")
+        raise InputError(f"from_handover: the estimate has no values at {t_s[0]:g} s, the instant of the handover")
     return {**columns, **{name: columns[name] - error[i] for i, name in enumerate(POSITION_NED)}}

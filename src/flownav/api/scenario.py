@@ -21,7 +21,8 @@ WORDS = {"gps": "model", "filter": "name", "vehicle": "file", "autopilot": "feed
 
 
 class Scenario:
-    """What is flown: path, vehicle, sensors, wind, filter and autopilot, as docs/reference/scenarios.md has them.
+    """The flight to be flown: path, vehicle, sensors, wind, filter and autopilot, as docs/reference/scenarios.md has
+    them.
 
     file: the checked scenario file; its tables are attributes of it. A Scenario never changes; `changed` makes another.
 
@@ -61,7 +62,7 @@ class Scenario:
 
     @property
     def description(self) -> str:
-        """What the file says of itself, one line.
+        """The file's own description, one line.
 
         Example:
             >>> "land" in flownav.Scenario.load("landing").description
@@ -150,7 +151,9 @@ def _given(name: str, value: Any) -> Any:
 
 
 def wind_of(text: str) -> dict[str, float]:
-    """The wind that "8" or "8:270" says: speed at 20 ft [m/s], and where it blows from [deg]. InputError otherwise."""
+    """The wind that "8" or "8:270" stands for: speed at 20 ft [m/s], and where it blows from [deg]. InputError
+    otherwise.
+    """
     speed, _, direction = text.partition(":")
     try:
         given = {"speed_20ft_m_s": float(speed)}

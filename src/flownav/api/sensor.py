@@ -58,7 +58,7 @@ class Sensor:
 
     @property
     def name(self) -> str:
-        """What the file calls it.
+        """The name in the file.
 
         Example:
             >>> "PX4FLOW" in flownav.Sensor.load().name
@@ -104,7 +104,7 @@ class Sensor:
 
     @property
     def verdict(self) -> str:
-        """What the log that it was identified from could show at all; "" where no identification stands in the file.
+        """Verdict on the log that it was identified from; "" where no identification stands in the file.
 
         Example:
             >>> flownav.Sensor.load().verdict

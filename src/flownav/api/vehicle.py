@@ -46,7 +46,7 @@ class Vehicle:
 
     @property
     def name(self) -> str:
-        """What the file calls it.
+        """The name in the file.
 
         Example:
             >>> flownav.Vehicle.load("quad-450").name

@@ -57,7 +57,7 @@ with_inner_loop = replacing(AutopilotState, "lon", "lat", "pedal")
 
 
 class Estimate(NamedTuple):
-    """What the outer loop flies on: position NED [m], velocity and measured specific force body FRD [m/s, m/s2]."""
+    """Feedback of the outer loop: position NED [m], velocity and measured specific force body FRD [m/s, m/s2]."""
 
     pos_n: float
     pos_e: float
@@ -108,7 +108,7 @@ def landing_logic(
     may_land: float,
     dt: float,
 ) -> AutopilotState:
-    """On the skids until told to fly; in flight until the skids have carried weight for 0.1 s after `may_land`."""
+    """On the skids until commanded to fly; in flight until the skids have carried weight for 0.1 s after `may_land`."""
     touching = contact_force_n > contact_threshold_n
     contact_time = state.contact_time_s + dt if (touching and may_land > 0.0) else 0.0
     landed = contact_time > 0.1
@@ -126,7 +126,7 @@ def along_heading(rotation: Rotation, n: float, e: float) -> tuple[float, float]
 
 @equation
 def unexplained_acceleration(estimate: Estimate, rotation: Rotation, gains: AutopilotGains) -> tuple[float, float]:
-    """What the accelerometer feels, forward and to the right [m/s2], less what the tilt against trim gives.
+    """Specific force forward and to the right [m/s2], less the part due to the tilt against trim.
 
     A gust's push and a wind's drag: felt at once, where the velocity shows them only later.
     """

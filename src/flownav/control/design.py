@@ -3,7 +3,7 @@
 The shape of a helicopter's loops is the outcome of a search (`tools/shape_gains.py`): of all gains whose loops keep
 their margins at every corner of the shipped vehicle's uncertainty box, those with the least error of position in
 turbulence. Here it stands in units that the control powers take out, so that another vehicle gets loops of the same
-bandwidth; whether they hold on it is what `flownav vehicle FILE --margins` says.
+bandwidth; whether they hold on it is printed by `flownav vehicle FILE --margins`.
 
 A multirotor's horizontal axes are where a local search for the least drift (that tool's measure and margins) ended on
 the shipped 450 mm quad, its gains then lowered by hand until the loops of both shipped multirotors keep 45 degrees with
@@ -48,8 +48,8 @@ def gains_for(
 ) -> AutopilotGains:
     """The gains for a vehicle of either kind and its trim.
 
-    idle_collective_rad: of a helicopter; a multirotor's file states its own idle. feels_gusts: an accelerometer tells
-    of gusts (see `unexplained_acceleration`).
+    idle_collective_rad: of a helicopter; a multirotor's file states its own idle. feels_gusts: an accelerometer
+    measures gusts (see `unexplained_acceleration`).
     """
     if isinstance(vehicle, MultirotorParameters) and isinstance(hover, MultirotorTrim):
         return multirotor_gains(vehicle, hover, feels_gusts=feels_gusts)
@@ -85,11 +85,11 @@ def helicopter_gains(
     )
 
 
-SLOP_UNSURE = 0.3  # standard deviation of the dead band, a share: half of what the shipped sheet says
+SLOP_UNSURE = 0.3  # standard deviation of the dead band, a share: half of the shipped sheet's value
 
 
 def told_before(vehicle: VehicleParameters, hover: Trim, begins: int) -> Told:
-    """What is believed of a helicopter before it is learnt in hover; begins: the epoch of the stir, below 0: never."""
+    """Beliefs about a helicopter before it is learnt in hover; begins: the epoch of the stir, below 0: never."""
     spring = vehicle.hub_stiffness_n_m_rad + vehicle.hub_above_cg_m * hover.thrust_n
     inflow, tip = hover.induced_velocity_m_s, vehicle.main_tip_speed_m_s
     back = vehicle.flap_response * rotor.blowback(

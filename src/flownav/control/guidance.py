@@ -1,4 +1,4 @@
-"""Guidance: where the helicopter is told to be; and going around: when a landing is broken off, and tried again.
+"""Guidance: the commanded path of the helicopter; and going around: when a landing is broken off, and tried again.
 
 The path is one of knots in the local NED frame relative to the pad: position (0, 0, 0) is the ground at the pad's
 centre, so `down` is minus the height of the skids. Between knots the reference moves in straight lines at constant
@@ -13,7 +13,7 @@ well, and comes down again; without a camera that could help it for so long only
 often only: then it lands with what it has. A vehicle that must find its pad with a camera never lands without having
 found it, over ground that its range knows.
 
-Last: what is brought over the pad, and the gate before the touchdown.
+Last: the point that is brought over the pad, and the gate before the touchdown.
 """
 
 from typing import NamedTuple
@@ -110,12 +110,12 @@ SEEN_S = 1.0  # a pad that was seen so lately is in sight: ten images of the shi
 
 
 class Knowledge(NamedTuple):
-    """What a landing vehicle knows beside where it is.
+    """Knowledge of a landing vehicle beyond its position.
 
-    pad_found: 1 where the pad has been seen or stood upon; ground_found: 1 where a range tells the height over the
+    pad_found: 1 where the pad has been seen or stood upon; ground_found: 1 where a range measures the height over the
     ground, which else is that of GPS, metres off; pad_unseen_s: since the camera last saw the pad; sigma_m: of the
     position over the pad, along its worse horizontal axis; doubted: 1 where the navigator suspects a fault;
-    powerless_s: for how long the speed controller has told that the motor gives nothing.
+    powerless_s: for how long the speed controller has reported that the motor gives nothing.
     """
 
     pad_found: float
@@ -238,14 +238,14 @@ def climb_out(height_m: float, gains: AutopilotGains) -> float:
     )
 
 
-FELT_S = 0.2  # chosen: so long the speed controller must tell it
+FELT_S = 0.2  # chosen: for this long the speed controller must report it
 # chosen by the least sink at the touchdown from 3 and 10 m (control.md)
 GLIDE_M_S, FLARE_1_S, FLARE_RAD = 4.0, 1.3, 0.12
 
 
 @equation
 def powerless(known: Knowledge) -> bool:
-    """The motor gives nothing: what the rotor's turning still holds must do for the landing."""
+    """The motor gives nothing: the energy of the turning rotor must do for the landing."""
     return known.powerless_s > FELT_S
 
 
@@ -263,7 +263,7 @@ BLIND_M_S = 0.5  # chosen: what the range sensor's 3.5 m and the heave loop stop
 
 @equation
 def sunk(vel_d: float, known: Knowledge, contact_time_s: float, landing: bool, gains: AutopilotGains) -> float:
-    """Velocity down [m/s] of a landing that knows no height: on down, whatever GPS says of it, until a range finds the
+    """Velocity down [m/s] of a landing that knows no height: on down, without regard to GPS, until a range finds the
     ground; and with weight on its skids, that a gate or a wrong height does not lift it again.
     """
     blind = landing and known.ground_found == 0.0 and gains.search_height_m > 0.0

@@ -58,7 +58,7 @@ STIR = np.ascontiguousarray(
 )
 SUMS = 6  # of a line in a period: own rate, the other axis' rate, command; real and imaginary parts
 SPECTRA = MOST_PERIODS * LINES * SUMS  # rows of all
-UNKNOWN = 6  # ln k of pitch and roll, ln f, ln of the servo's frequency, damping and answer, from what is told
+UNKNOWN = 6  # ln k of pitch and roll, ln f, ln of the servo's frequency, damping and answer, from the beliefs before
 OWN = 5  # of which an axis has: its k and the other four
 SCRATCH = UNKNOWN * UNKNOWN + 2 * UNKNOWN
 ITERATIONS = 5
@@ -70,12 +70,12 @@ PRIOR = (0.45, 0.45, 0.25, 0.25, 0.07)  # standard deviations of the unknown: wi
 # of a line's residuals: gusts leave the more the slower they are (their spectrum falls as 1/w²)
 WEIGHTS = np.clip(OMEGA_RAD_S / 12.0, 0.4, 1.2)
 NOTHING_SAID_RAD = 3e-5  # standard deviation of a residual before any is known: a gust's of 4 m/s
-STEEPEST = 0.26  # sine of the tilt beyond what is asked for at which the stir is broken off: 15 degrees
+STEEPEST = 0.26  # sine of the tilt beyond the commanded one at which the stir is broken off: 15 degrees
 
 
 class Stir(NamedTuple):
-    """What is added to the cyclics [rad], by how much it grows with each step of the attitude loop, and the mean of
-    what has been asked of them in this epoch, the stir in it.
+    """The stir added to the cyclics [rad], by how much it grows with each step of the attitude loop, and the mean
+    command to them in this epoch, with the stir.
     """
 
     lon: float
@@ -87,7 +87,7 @@ class Stir(NamedTuple):
 
 
 class Learnt(NamedTuple):
-    """What has been learnt: state 0 nothing yet, 1 learnt, -1 too unsure, -2 broken off, -3 outside the table.
+    """Result of learning: state 0 nothing yet, 1 learnt, -1 too unsure, -2 broken off, -3 outside the table.
 
     Numbers as in `Told`; std: standard deviations of their logarithms; lag: 1/f and the servo's 2ζ/ω together.
     """
@@ -145,7 +145,9 @@ def line_at(work: Work, lanes: Lanes, row: int, period: int, line: int, lane: in
 
 @procedure
 def servo_error(work: Work, lanes: Lanes, row: int, lane: int, axis: int, told: Told, periods: int) -> float:
-    """Standard deviation of what an axis' servos are behind their command, as they are told to be [rad]."""
+    """Standard deviation of the angle by which an axis' servos are behind their command, by their stated model
+    [rad].
+    """
     answers, power = 1.0, 0.0
     for _ in range(2):
         power = 0.0
@@ -165,7 +167,9 @@ def servo_error(work: Work, lanes: Lanes, row: int, lane: int, axis: int, told: 
 
 @procedure
 def solved(work: Work, lanes: Lanes, row: int, scratch: int, lane: int, told: Told, periods: int) -> Learnt:
-    """What the sums of so many periods say: Gauss-Newton, on top of what is told. scratch: rows to work in."""
+    """Gauss-Newton estimate from the sums of the periods, with the beliefs in `told` as prior. scratch: rows to work
+    in.
+    """
     apart = len(lanes)
     normal = scratch * apart + lane
     slope, x = normal + UNKNOWN * UNKNOWN * apart, normal + (UNKNOWN + 1) * UNKNOWN * apart

@@ -92,7 +92,7 @@ def inside(value: float, nodes: "np.ndarray[tuple[int, ...], np.dtype[np.float64
 
 @procedure
 def judged(learnt: Learnt) -> Learnt:
-    """What was solved, with its verdict."""
+    """The solution with its verdict."""
     pitch, roll = -log_of_unit(1.0 / learnt.pitch_stiffness_1_s2), -log_of_unit(1.0 / learnt.roll_stiffness_1_s2)
     lag = log_of_unit(learnt.lag_s)
     sure = learnt.std_pitch_stiffness < LEAST_SURE and learnt.std_roll_stiffness < LEAST_SURE

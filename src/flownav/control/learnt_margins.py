@@ -1,8 +1,9 @@
-"""What the loops of a vehicle that was learnt in hover keep: its plant as it was learnt, and the box of what is left.
+"""Stability margins of a vehicle that was learnt in hover: its plant as it was learnt, and the box of the remaining
+doubt.
 
-The told vehicle with what was learnt in it: its inertias moved until the stiffnesses are those, its flapping and its
-cyclic servos as they were found. The box of it has the ends of the 95 % intervals of stiffness and lag, crossed with
-what a stir does not show, drag and flapping response; mass is moved alone.
+The vehicle of the file with the learnt numbers in it: its inertias moved until the stiffnesses are those, its flapping
+and its cyclic servos as they were found. The box of it has the ends of the 95 % intervals of stiffness and lag, crossed
+with drag and flapping response, which a stir does not show; mass is moved alone.
 """
 
 import itertools
@@ -27,7 +28,7 @@ DRAG, MASS = 0.35, 0.076  # as the box that the table was searched for (tools/le
 
 
 def as_learnt(vehicle: VehicleParameters, hover: Trim, learnt: Learnt) -> VehicleParameters:
-    """The told vehicle with these stiffnesses, this flapping and these servos."""
+    """The vehicle of the file with these stiffnesses, this flapping and these servos."""
     told = told_before(vehicle, hover, -1)
     late = learnt.lag_s - 1.0 / learnt.flap_rate_1_s
     return vehicle._replace(
@@ -39,7 +40,7 @@ def as_learnt(vehicle: VehicleParameters, hover: Trim, learnt: Learnt) -> Vehicl
 
 
 def corners_of(vehicle: VehicleParameters, hover: Trim, learnt: Learnt) -> Iterator[tuple[str, VehicleParameters]]:
-    """What was learnt may be: each corner by name."""
+    """Corners of the learnt vehicle's uncertainty, each by name."""
     yield "as learnt", as_learnt(vehicle, hover, learnt)
     for k, lag, drag in itertools.product((-1.0, 1.0), repeat=3):
         moved = learnt._replace(
@@ -66,7 +67,7 @@ def margins_of_learnt(vehicle: VehicleParameters, hover: Trim, learnt: Learnt, g
 def margins_of_record(manifest: Mapping[str, Any], where: str) -> Box:
     """The margins of the gains that a recorded flight found for the vehicle that it learnt. InputError: it learnt none.
 
-    They are computed when they are asked for: they would cost every flight a quarter of a second.
+    They are computed when they are used: they would cost every flight a quarter of a second.
     """
     learnt, parameters = manifest.get("learnt") or {}, manifest.get("parameters") or {}
     vehicle = flattened(described_again(parameters["vehicle"], where)) if learnt.get("verdict") == "learnt" else None

@@ -21,7 +21,7 @@ LEAST_ANSWERED = 0.01  # of an error, though it is far inside the slop: what is 
 
 
 class Told(NamedTuple):
-    """What is believed of the vehicle before: k, f and the servo's (see above); blowback: B [rad per m/s].
+    """Beliefs about the vehicle before learning: k, f and the servo's (see above); blowback: B [rad per m/s].
 
     slop_rad: the dead band of servo and linkage, and slop_std_rad how sure that is.
 
@@ -41,7 +41,7 @@ class Told(NamedTuple):
 
 
 class Residual(NamedTuple):
-    """What the model leaves of a line's command [rad]; derivatives by ln k, ln f, the servo's ln ω, ln ζ, ln N."""
+    """Residual of the model for a line's command [rad]; derivatives by ln k, ln f, the servo's ln ω, ln ζ, ln N."""
 
     re: float
     im: float

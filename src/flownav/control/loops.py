@@ -1,9 +1,9 @@
 """The autopilot's loops, each as it is where every other one is closed: by frequency, and as they are sampled.
 
 The flight kernel runs `autopilot.inner_loop` at 250 Hz and `autopilot.outer_loop` at 50 Hz, each holding its commands.
-Here the same laws stand as frequency responses between the signals at which a loop can be cut: the four blade
-commands, the measured body rates, and the commands that the outer loops hand to the inner ones. With F(jω) the matrix
-that takes these signals round to themselves, cutting signal i and leaving all others closed shows the loop
+Here the same laws stand as frequency responses between the signals at which a loop can be cut: the four blade commands,
+the measured body rates, and the commands that the outer loops pass to the inner ones. With F(jω) the matrix that takes
+these signals round to themselves, cutting signal i and leaving all others closed shows the loop
 
     L_i(jω) = 1/[(I - F)⁻¹]_ii - 1        (so that the closed loop is stable up to L_i = -1)
 

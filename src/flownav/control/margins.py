@@ -1,7 +1,7 @@
 """Stability margins of a loop from its frequency response L(jω), where L = -1 is the edge of stability.
 
 `margins_over_box` has those of every loop at every corner of a vehicle's uncertainty box, flown with the gains of the
-vehicle as told.
+file's nominal vehicle.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from flownav.vehicle.linearize import Complex, LinearPlant, frequency_response, 
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.trim import Trim
 
-# What MIL-DTL-9490E asks of a rigid vehicle's loops. Gains that keep them for the vehicle as told alone drift a tenth
+# MIL-DTL-9490E's limits for a rigid vehicle's loops. Gains that keep them for the nominal vehicle alone drift a tenth
 # as far, and keep 10 degrees and 1 dB at a corner; those with 7 and 1.9 were unstable inside the box (control.md).
 LEAST_PHASE_DEG = 45.0
 LEAST_GAIN_DB = 6.0
@@ -52,7 +52,7 @@ def margins_over_box(path: Path | None = None, *, feels_gusts: bool = True) -> B
     """The margins of a vehicle file's loops, nominal first; the shipped vehicle where `path` is None.
 
     Each corner is judged with the inflow in balance at once, and held; a helicopter's also with its inflow's lag and a
-    rotor speed that droops. InputError as `load_vehicle` and, for the vehicle as told, `trim`.
+    rotor speed that droops. InputError as `load_vehicle` and, for the nominal vehicle, `trim`.
     """
     told = load_vehicle(path)
     gains = gains_for(told, hover_of(told), 0.0, feels_gusts=feels_gusts)

@@ -1,1 +1,1 @@
-"""What everything stands on: compiled equations, frames, records, and files read within limits and written whole."""
+"""Foundations of all rooms: compiled equations, frames, records, and files read within limits and written whole."""

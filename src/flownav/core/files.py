@@ -47,7 +47,7 @@ def folder_written_whole(path: Path) -> Iterator[Path]:
 
 
 def _hidden() -> str:
-    """A name that nobody has, and no longer than others."""
+    """A name that no file has, and no longer than others."""
     return f".{secrets.token_hex(8)}.{os.getpid()}.part"
 
 

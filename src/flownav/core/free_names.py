@@ -44,7 +44,7 @@ def a_place_of_several(path: Path, inputs: Iterable[Path] = (), *, force: bool) 
 
 
 def _several(path: Path) -> list[Path]:
-    """What is there of such files."""
+    """Existing files of such names."""
     return list(path.parent.glob(f"{escape(path.stem)}_*{path.suffix}")) if path.parent.is_dir() else []
 
 

@@ -1,4 +1,5 @@
-"""What a run may read and where it may write: no output is ever an input, a link, a device or somebody else's file.
+"""Limits on what a run may read and where it may write: no output is ever an input, a link, a device or a file that
+flownav did not write.
 
 Readers pass every path through `an_input` before they open it. What a user named to be written is written with the
 `written_whole` of this file, which passes it through `an_output`. Within `a_run` (the command line's is one) what was
@@ -32,7 +33,7 @@ Identity = tuple[int, int]  # of a file, whatever its names: device and inode
 
 
 class Inputs:
-    """What a run reads: files by their identity, and folders."""
+    """Inputs that a run reads: files by their identity, and folders."""
 
     def __init__(self) -> None:
         self._paths: dict[Identity, Path] = {}
@@ -105,7 +106,9 @@ def object_in(path: Path, advice: str, most: int = MOST_JSON_BYTES) -> dict[str,
 
 
 def inputs_there(paths: Iterable[Path], what: str) -> None:
-    """InputError where a file or folder that is to be read is missing, or cannot be read; `what` says what is taken."""
+    """InputError where a file or folder that is to be read is missing, or cannot be read; `what` names the kind of
+    input.
+    """
     for path in paths:
         if not an_input(path).exists():
             raise InputError(f"{path}: no such file or folder; {what}")
@@ -185,7 +188,7 @@ def folder_written_whole(path: Path) -> Iterator[Path]:
 
 
 def _status_of_output(path: Path, inputs: Iterable[Path]) -> os.stat_result | None:
-    """What the system says of a file to be written. InputError where it is none, or is read."""
+    """Status of a file to be written; None where there is none yet. InputError where it is no file, or is an input."""
     info = _status(path, _unfollowed)
     if info is not None and stat.S_ISLNK(info.st_mode):
         raise InputError(_through_a_link(path))
@@ -228,7 +231,7 @@ def _unfollowed(path: Path) -> os.stat_result:
 
 
 def _status(path: Path, look: Callable[[Path], os.stat_result]) -> os.stat_result | None:
-    """What the system says of a path; None where nothing is there. InputError where the path cannot be one."""
+    """Status of a path; None where nothing is there. InputError where the path cannot be one."""
     try:
         return look(path)
     except (FileNotFoundError, NotADirectoryError, PermissionError):

@@ -1,4 +1,5 @@
-"""By what a file is known as flownav's, so that it may be replaced: a mark at a fixed place that nobody else writes.
+"""By what a file is known as flownav's, so that it may be replaced: a mark at a fixed place that no other program
+writes.
 
 A text begins with a line that has the SHA-256 of all that follows, so that one which was edited is no longer ours: who
 edits a file has made it. JSON has no comments: there the digest is a key. EuRoC's tables begin with their columns'
@@ -42,7 +43,9 @@ ZIP_ERRORS = (
 
 
 def marked(text: str, comment: tuple[str, str] = HASH) -> bytes:
-    """A text as a file's bytes, with the mark. comment: how one begins and ends; what is no text is spelt out."""
+    """A text as a file's bytes, with the mark. comment: how one begins and ends; bytes that are no text are written as
+    escapes.
+    """
     first = DECLARATION if text.startswith(DECLARATION) else ""
     rest = text[len(first) :].encode("utf-8", errors="backslashreplace")
     return f"{first}{comment[0]}{LINE}{hashlib.sha256(rest).hexdigest()}{comment[1]}\n".encode() + rest
@@ -64,7 +67,7 @@ def _digest(entries: dict[str, Any]) -> str:
 
 
 def is_ours(path: Path) -> bool:
-    """Whether flownav wrote a file, as it is, and can write it again: nothing is lost that somebody made, or flew."""
+    """Whether flownav wrote a file, as it is, and can write it again: no file that a user made, or flew, is lost."""
     try:
         with path.open("rb") as file:
             head = file.read(LOOKED_AT_BYTES)

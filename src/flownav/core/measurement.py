@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 class Sensor(IntEnum):
-    """What measured. The values are stable: they are written to records and read by kernels."""
+    """The kind of a measurement's source. The values are stable: they are written to records and read by kernels."""
 
     GPS_POSITION = 1  # north, east, down of the local frame [m]
     GPS_VELOCITY = 2  # north, east, down [m/s]
@@ -156,7 +156,7 @@ def merge(streams: Iterable[Stream]) -> EventQueue:
 
 
 def merged_parts(streams: Iterable[Stream], longest: int) -> Iterator[EventQueue]:
-    """Parts of the queue, of so many events at most, one at least: a long log's is larger than the log itself."""
+    """Parts of the queue, of `longest` events at most, one at least: a long log's is larger than the log itself."""
     streams = [s for s in streams if len(s)]
     firsts = np.cumsum([0, *map(len, streams)])
     order = np.argsort(np.concatenate([np.zeros(0), *(s.t_s - s.delay_s for s in streams)]), kind="stable")

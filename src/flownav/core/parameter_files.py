@@ -134,7 +134,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def _deeper_than(entries: Any, levels: int) -> bool:
-    """Whether tables and lists stand in each other more than so many levels deep."""
+    """Whether tables and lists stand in each other more than `levels` deep."""
     floor = [entries]
     for _ in range(levels):
         floor = [inner for outer in floor for inner in (outer.values() if isinstance(outer, dict) else outer)]
@@ -160,7 +160,7 @@ def check(entries: dict[str, Any], schema: type[Model], where: str) -> Model:
 
 
 def _sentence(error: Any, schema: type[BaseModel]) -> str:
-    """What is wrong with one key and what would be right."""
+    """One sentence on the error of a key, and what would be right."""
     kind, given = error["type"], error["input"]
     if kind == "extra_forbidden":
         known = sorted(_keys_beside(error["loc"], schema))

@@ -1,6 +1,6 @@
-"""What a Parquet file says of its sizes, before any of it is decompressed, so that no small file becomes a large one.
+"""Sizes that a Parquet file states, read before any of it is decompressed, so that no small file becomes a large one.
 
-Its footer and the headers of its pages are read here, and held against each other (Thrift's compact protocol,
+Its footer and the headers of its pages are read here, and compared with each other (Thrift's compact protocol,
 apache/parquet-format): pyarrow believes both, and ends the process at some footers that are damaged.
 """
 
@@ -35,7 +35,7 @@ class Footer(NamedTuple):
 
 
 def read_footer(data: bytes) -> Footer:
-    """What the footer says. ValueError where it is none, or its parts do not agree."""
+    """The footer's contents. ValueError where it is none, or its parts do not agree."""
     length = int.from_bytes(data[-8:-4], "little")
     if data[-4:] != MAGIC or length + 12 > len(data):
         raise ValueError("not a Parquet file")

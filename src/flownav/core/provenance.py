@@ -33,7 +33,7 @@ def provenance(inputs: Iterable[Path] = ()) -> dict[str, Any]:
 
 @contextmanager
 def called_as(call: str) -> Iterator[None]:
-    """Within it results are said to come from this call of the Python API, and not from a command."""
+    """Within it results name this call of the Python API as their origin, and not a command."""
     before = _call.set(call)
     try:
         yield

@@ -22,7 +22,7 @@ POSITION_NED = ("pos_n_m", "pos_e_m", "pos_d_m")
 VELOCITY_BODY = ("vel_u_m_s", "vel_v_m_s", "vel_w_m_s")
 QUATERNION = ("qw", "qx", "qy", "qz")
 
-# What a navigator was fed, row by row in its order: the instant that the reading describes (t_s), its stamp on arrival,
+# Readings fed to a navigator, row by row: the instant that the reading describes (t_s), its stamp on arrival,
 # measurement.Sensor, values and variances (unused ones NaN), quality, and which of `segments` took it. withheld: 1
 # where the user took it away; arrived: 0 where the sensor was due and stayed silent.
 FED_FIRST = ("t_s", "arrival_s", "sensor", *(f"value_{i}" for i in range(6)), *(f"variance_{i}" for i in range(6)),
@@ -51,24 +51,24 @@ RATES = ("rate_p_rad_s", "rate_q_rad_s", "rate_r_rad_s")
 TABLES: dict[str, tuple[str, ...]] = {
     # what was so (simulation, motion capture)
     "truth": (*STATE, *RATES, "thrust_n", "on_ground"),
-    # what the filter says, with one standard deviation of each, and how far off it may be if a sensor fails unseen
+    # the filter's estimate, with one standard deviation of each, and how far off it may be if a sensor fails unseen
     "estimate": (*STATE, *STANDARD_DEVIATIONS, *PROTECTION_LEVELS),
     # where the truth is known: the error squared of position and velocity over what the filter states (NEES)
     "consistency": ("nees",),
-    # the rest of what it says, at the same instants: velocity in the earth's axes, standard deviations of the attitude,
+    # the rest of its state, at the same instants: velocity in the earth's axes, standard deviations of the attitude,
     # and every other state with its own
     "states": (
         *VELOCITY_NED, *(f"std_{name}" for name in TILTS), *FILTER_STATES, *(f"std_{name}" for name in FILTER_STATES),
     ),
-    # what the filter says once it has seen the whole flight
+    # the filter's estimate from the whole flight
     "smoothed": (*STATE, *STANDARD_DEVIATIONS),
-    # what another estimator said (an autopilot's own)
+    # the estimate of another estimator (an autopilot's own)
     "autopilot": STATE,
-    # what an autopilot flew on: the estimate carried on to now, position from where the pad is taken to be
+    # the estimate that an autopilot used, carried on to now: position from where the pad is taken to be
     "flown": STATE,
-    # what the vehicle was told: references and controls
+    # the vehicle's commands: references and controls
     "command": ("pos_n_ref_m", "pos_e_ref_m", "pos_d_ref_m", "lon_rad", "lat_rad", "col_rad", "ped_rad"),
-    # what a log says that its autopilot asked for, position in the frame of "autopilot", and its battery
+    # the autopilot's setpoints by a log, position in the frame of "autopilot", and its battery
     "setpoint": (*POSITION_NED, *QUATERNION),
     "battery": ("voltage_v", "current_a", "remaining_percent"),
     # one row per measurement component offered to the filter (PX4's estimator_aid_src fields)

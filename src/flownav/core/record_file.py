@@ -45,7 +45,7 @@ WRONG = (
 
 
 class Manifest(BaseModel):
-    """What a manifest's keys are, where it has them; what it says beside them is kept as it is."""
+    """Keys of a manifest, where it has them; further keys are kept as they are."""
 
     model_config = ConfigDict(extra="allow", strict=True)
 
@@ -72,7 +72,7 @@ class Manifest(BaseModel):
 
 
 def save(manifest: dict[str, Any], tables: Tables, path: Path, *, replacing: bool = False) -> None:
-    """Write a record as one file, whole or not at all; as `Record.save` says. The same record is the same bytes."""
+    """Write a record as one file, whole or not at all; as in `Record.save`. The same record is the same bytes."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -140,7 +140,7 @@ class _Bounded(io.FileIO):
 
 
 def _allowed(size: int) -> int:
-    """Bytes in memory that a file of so many bytes may become."""
+    """Bytes in memory that a file of this size may become."""
     return min(MOST_BYTES, max(ALWAYS_BYTES, MOST_GROWTH * size))
 
 
@@ -178,7 +178,7 @@ def _manifest(text: bytes, path: Path, newest: int) -> dict[str, Any]:
 
 
 def _check_tables(bundle: zipfile.ZipFile, names: list[str], size: int, known: Mapping[str, tuple[str, ...]]) -> None:
-    """What the tables say of themselves, before any is read: columns, types, and how large they become."""
+    """Check the tables' own statements before any is read: columns, types, and how large they become."""
     import pyarrow.parquet as pq
 
     left = _allowed(size)

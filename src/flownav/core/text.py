@@ -56,7 +56,7 @@ def exactly(value: float, times: int = 1) -> str:
 
 
 def plain(text: str) -> str:
-    """Text for a file in UTF-8: the bytes of a file's name that are none are spelt out."""
+    """Text for a file in UTF-8: the bytes of a file's name that are no UTF-8 are written as escapes."""
     return text.encode("utf-8", errors="backslashreplace").decode("utf-8")
 
 

@@ -43,7 +43,7 @@ LARGEST_VARIANCE = 1e30  # chosen: no reading is so poor, and its square is stil
 
 
 def with_lag(lanes: Lanes) -> Lanes:
-    """The marker of so many lanes of a filter of STATES_WITH_LAG states: of floats, which makes it another type."""
+    """The marker of these lanes for a filter of STATES_WITH_LAG states: of floats, which makes it another type."""
     return cast(Lanes, tuple(float(lane) for lane in lanes))
 
 

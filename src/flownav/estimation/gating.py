@@ -7,7 +7,7 @@ from enum import IntEnum
 
 
 class Reason(IntEnum):
-    """What became of one measurement component. `FUSED` is the only one that is no rejection."""
+    """Outcome of one measurement component. `FUSED` is the only one that is no rejection."""
 
     FUSED = 0
     INNOVATION_GATE = 1

@@ -1,4 +1,5 @@
-"""Faults that may be there and are not modelled: what one unit of each does to the error, and what innovations tell.
+"""Faults that may be there and are not modelled: the effect of one unit of each on the error, and the evidence of
+innovations.
 
 A hypothesis is a constant b that adds h_b b to a reading, or moves the filter by a steady specific force. The mean
 error that it causes is s b, where s goes through the filter as a considered state's covariance does (Schmidt):
@@ -6,10 +7,10 @@ error that it causes is s b, where s goes through the filter as a considered sta
     s <- F s + g   over a step,      s <- s - K c,   c = k h s + h_b   with a reading,
 
 in columns beside the covariance, which change nothing of the estimate. The innovation's mean is then c b, so that
-innovations tell b by a likelihood ratio: information J = sum c^2/S, score d = sum c nu/S, b = d/J (Willsky and Jones, A
+innovations give b by a likelihood ratio: information J = sum c^2/S, score d = sum c nu/S, b = d/J (Willsky and Jones, A
 Generalized Likelihood Ratio Approach to the Detection and Estimation of Jumps in Linear Systems, IEEE Transactions on
-Automatic Control 21(1), 1976).
-What the filter estimates by itself leaves no trace in c: a flow scale that is learnt is no fault.
+Automatic Control 21(1), 1976). What the filter estimates by itself leaves no trace in c: a flow scale that is learnt is
+no fault.
 """
 
 from typing import NamedTuple
@@ -34,7 +35,7 @@ from flownav.estimation.states import (
 
 # what each hypothesis is, and its unit
 FLOW_SCALE = 0  # flow too large; 1: twice
-FLOW_AGE = 1  # flow older than said [s]
+FLOW_AGE = 1  # flow older than stated [s]
 RANGE_OFFSET = 2  # range too long [m]
 GPS_DRIFT = 3  # 3: GPS position drifts off north, east, down [m/s]
 HEADING_OFF = 6  # what is read as heading, too large [rad]
@@ -53,7 +54,7 @@ NAMES = (
 
 
 class Size(NamedTuple):
-    """What is known of a fault's size: estimate, standard deviation, and (estimate / standard deviation) squared."""
+    """Estimate of a fault's size: estimate, standard deviation, and (estimate / standard deviation) squared."""
 
     size: float
     sigma: float
@@ -69,13 +70,13 @@ def size_of(information: float, score: float, prior_sigma: float) -> Size:
 
 @equation
 def followed(work: Work, lanes: Lanes) -> int:
-    """How many columns follow faults: COUNT and what they left, or 0."""
+    """How many columns follow faults: COUNT and those of left effects, or 0."""
     return int(work[HYPOTHESES * len(lanes)])
 
 
 @equation
 def size_told(work: Work, lanes: Lanes, fault: int, lane: int, prior_sigma: float) -> Size:
-    """What innovations tell of a fault's size in a lane."""
+    """Size of a fault in a lane by its innovations."""
     information, score = work[(INFORMATION + fault) * len(lanes) + lane], work[(SCORE + fault) * len(lanes) + lane]
     return size_of(information, score, prior_sigma)
 
@@ -100,7 +101,9 @@ def hold_unlearnt(work: Work, lanes: Lanes, n: int) -> None:
 
 @procedure
 def weigh(work: Work, lanes: Lanes, n: int, color: float) -> None:
-    """What the innovation that was just fused tells of each fault; color: how many readings err alike, in effect."""
+    """Add the information of the innovation that was just fused to each fault; color: number of readings that err
+    alike, in effect.
+    """
     for k in range(followed(work, lanes)):
         for lane in range(len(lanes)):
             fused = work[ACCEPTED * len(lanes) + lane] > 0.0
@@ -115,7 +118,7 @@ def weigh(work: Work, lanes: Lanes, n: int, color: float) -> None:
 
 @procedure
 def fade(work: Work, lanes: Lanes, factor: float) -> None:
-    """What was told long ago is told of another fault: J <- factor J, d <- factor d."""
+    """Forget old information, which may be of another fault: J <- factor J, d <- factor d."""
     for k in range(followed(work, lanes)):
         for lane in range(len(lanes)):
             work[(INFORMATION + k) * len(lanes) + lane] *= factor
@@ -124,7 +127,7 @@ def fade(work: Work, lanes: Lanes, factor: float) -> None:
 
 @procedure
 def leave_lane(work: Work, lanes: Lanes, n: int, fault: int, lane: int, size: float) -> None:
-    """What a fault of this size has done stays when it is over: s_left <- s_left + s b."""
+    """Keep the effect of a fault of this size when it is over: s_left <- s_left + s b."""
     for i in range(n):
         work[at(i, n + LEFT) * len(lanes) + lane] += size * work[at(i, n + fault) * len(lanes) + lane]
 

@@ -39,7 +39,7 @@ class FlowLag(NamedTuple):
     gain: float
     sonar_floor_m: float  # below it the sensor multiplies its flow by this instead of the range; 0: it does not
     lens_below_m: float  # the lens below the vehicle's reference point, along body down
-    forward_m: float = 0.0  # the lens's lever from the IMU, body FRD; 0 where no gyro tells how it swings
+    forward_m: float = 0.0  # the lens's lever from the IMU, body FRD; 0 where no gyro measures its swing
     right_m: float = 0.0
     below_m: float = 0.0
 
@@ -114,9 +114,9 @@ def seen_velocity(
     rotation: Rotation, vel: VelocityNed, height_m: float, channel: int, sonar_floor_m: float, lens_below_m: float,
     swing_m_s: float = 0.0,
 ) -> Seen:  # fmt: skip
-    """What channel 0 (forward) or 1 (right) sees of the velocity: o (e . v + swing), o = floor/range below the floor.
+    """Channel 0 (forward) or 1 (right) as it sees the velocity: o (e . v + swing), o = floor/range below the floor.
 
-    swing_m_s: what turning adds at the lens.
+    swing_m_s: the velocity that turning adds at the lens.
     """
     e, along, turn = along_axis(rotation, channel, vel, swing_m_s)
     range_m, by_height, by_north, by_east = lens_range(rotation, height_m, (0.0, 0.0, lens_below_m))
@@ -237,13 +237,13 @@ def lag_step(work: Work, lanes: Lanes, m: LagMove, lag: FlowLag) -> None:
 
 @equation
 def lag_starts(work: Work, lanes: Lanes, lag: FlowLag) -> None:
-    """What the velocity at the start of a prediction leaves in the sensor at its end."""
+    """Add the effect that the velocity at the start of a prediction has on the sensor's state at its end."""
     lag_step(work, lanes, LagMove(lag.f11, lag.f12, lag.f21, lag.f22, lag.start_1, lag.start_2), lag)
 
 
 @equation
 def lag_ends(work: Work, lanes: Lanes, lag: FlowLag) -> None:
-    """What the velocity at the end of a prediction adds."""
+    """Add the effect of the velocity at the end of a prediction."""
     lag_step(work, lanes, LagMove(1.0, 0.0, 0.0, 1.0, lag.end_1, lag.end_2), lag)
 
 

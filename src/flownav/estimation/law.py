@@ -1,11 +1,11 @@
 """Scalar functions over named scalars, made to run on lanes: the loops and the index arithmetic that laws do without.
 
-A law says which scalars it reads by the names of its parameters, and which states its Jacobian or its result concerns
-by the fields of the NamedTuple that its return annotation names. From these names the code is written that loads each
-scalar of one lane, calls the law, and stores what it returns: straight-line code in a loop over lanes, which LLVM
-vectorises. Names are those of `states.ROWS_BY_NAME`; a vector's (`states.VECTOR_ROWS`) means its component `axis`.
-A parameter that is annotated with a NamedTuple is a record of such scalars: its fields are their names (`named`).
-Keyword-only parameters, and fields of such records, are passed by the caller, the same for all lanes.
+A law names the scalars that it reads by its parameters, and the states that its Jacobian or its result concerns by the
+fields of the NamedTuple in its return annotation. From these names the code is written that loads each scalar of one
+lane, calls the law, and stores what it returns: straight-line code in a loop over lanes, which LLVM vectorises. Names
+are those of `states.ROWS_BY_NAME`; a vector's (`states.VECTOR_ROWS`) means its component `axis`. A parameter that is
+annotated with a NamedTuple is a record of such scalars: its fields are their names (`named`). Keyword-only parameters,
+and fields of such records, are passed by the caller, the same for all lanes.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def step(function: Callable[..., Any]) -> Step:
 
 # -- from names to source -----------------------------------------------------------------------------------
 class Parameter(NamedTuple):
-    """What a law takes by one name: a number, or a record of numbers that have names of their own."""
+    """A law's parameter of one name: a number, or a record of numbers that have names of their own."""
 
     name: str
     record: Any = None
@@ -150,7 +150,7 @@ def at(row: int | str) -> str:
 
 
 def value_of(name: str) -> str:
-    """What a law's parameter of this name is given."""
+    """Source text of the value of a law's parameter of this name."""
     if name == "axis":
         return "axis"
     if name in VECTOR_ROWS:

@@ -87,7 +87,7 @@ def predict(work: Work, lanes: Lanes, n: int, dt_s: float, settings: FilterSetti
 
 
 class Moved(NamedTuple):
-    """What a step leaves: state, body rate, specific force NED, and R_EB in its middle, row by row."""
+    """Result of a step: state, body rate, specific force NED, and R_EB in its middle, row by row."""
 
     pos_n: float
     pos_e: float

@@ -1,4 +1,4 @@
-"""What laws are told, as records: their fields are names of states and rows, or of numbers that a caller passes."""
+"""Arguments of laws, as records: their fields are names of states and rows, or of numbers that a caller passes."""
 
 from typing import NamedTuple
 
@@ -40,7 +40,7 @@ class Tilt(NamedTuple):
 
 
 class Inertial(NamedTuple):
-    """What the IMU reads, body FRD: body rate [rad/s] and specific force [m/s2]."""
+    """Reading of the IMU, body FRD: body rate [rad/s] and specific force [m/s2]."""
 
     gyro_x: float
     gyro_y: float
@@ -160,7 +160,9 @@ class Beam(NamedTuple):
 
 
 class FlowMount(NamedTuple):
-    """The flow sensor's lever from the IMU, body FRD (0 where no gyro tells its turning), and its lens's depth [m]."""
+    """The flow sensor's lever from the IMU, body FRD (0 where no gyro measures its turning), and its lens's depth
+    [m].
+    """
 
     forward_m: float
     right_m: float

@@ -1,9 +1,9 @@
 """The filter's steps run backwards: a modified Bryson-Frazier smoother (docs/explanation/smoother.md).
 
-What later readings say of the error state at an instant is a vector lambda (STATES,) and a matrix Lambda (STATES,
-STATES), both 0 at the end; the smoothed error is -P lambda, its covariance P - P Lambda P (Bierman, Fixed interval
-smoothing with discrete measurements, International Journal of Control 18, 1973). Nothing is inverted, so states
-without variance and states that were reset do no harm. Process noise has no part in it: it is in the filter's
+The information of later readings on the error state at an instant is a vector lambda (STATES,) and a matrix Lambda
+(STATES, STATES), both 0 at the end; the smoothed error is -P lambda, its covariance P - P Lambda P (Bierman, Fixed
+interval smoothing with discrete measurements, International Journal of Control 18, 1973). Nothing is inverted, so
+states without variance and states that were reset do no harm. Process noise has no part in it: it is in the filter's
 covariances.
 """
 
@@ -34,7 +34,7 @@ def back_along_motion(x: Array, dt_s: float, middle: Array, force: Array) -> Non
     """
     half_s = 0.5 * dt_s
     for i in range(3):
-        x[VELOCITY + i] += half_s * x[POSITION + i]  # what the velocity after the step is asked
+        x[VELOCITY + i] += half_s * x[POSITION + i]  # the adjoint of the velocity after the step
     north, east, down = x[VELOCITY], x[VELOCITY + 1], x[VELOCITY + 2]
     asked = (
         dt_s * (force[1] * down - force[2] * east),
@@ -70,7 +70,9 @@ def back_over_prediction(vector: Array, matrix: Array, dt_s: float, middle: Arra
 
 @kernel
 def decay_factors(dt_s: float, settings: FilterSettings) -> Array:
-    """What `error_models.propagate_gauss_markov` multiplies each state by, (STATES,): less than 1 for such errors."""
+    """Factors by which `error_models.propagate_gauss_markov` multiplies each state, (STATES,): less than 1 for such
+    errors.
+    """
     factor = np.ones(STATES)
     for i in range(3):
         factor[GPS_SLOW + i] = exp(-dt_s / settings.gps_slow_tau_s)
@@ -115,7 +117,7 @@ def back_over_correction(
 
 @kernel
 def back_over_reset(vector: Array, matrix: Array, state: int) -> None:
-    """A state that was forgotten: nothing that follows tells of what it was before."""
+    """A state that was forgotten: later readings carry no information on its value before."""
     vector[state] = 0.0
     for i in range(STATES):
         matrix[state, i] = matrix[i, state] = 0.0

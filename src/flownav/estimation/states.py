@@ -29,7 +29,7 @@ GROUND = 27  # 1, down coordinate of the ground below [m]
 BARO = 28  # 1, pressure altitude less true altitude [m]
 FLOW_SCALE = 29  # 1, flow reported over flow by its datasheet, less 1
 COMPASS = 30  # 2, deviation of a compass: coefficients of sin and cos of the heading (hard iron) [rad]
-VELOCITY_LAG = 32  # 1, how much older GPS velocity is than its time says (receivers smooth it) [s]
+VELOCITY_LAG = 32  # 1, how much older GPS velocity is than its time (receivers smooth it) [s]
 PAD = 33  # 3, where the pad's centre lies, local NED [m]
 STATES = 36
 FLOW_LAG = 36  # 4, only where n is STATES_WITH_LAG: the flow sensor's dynamics, x1, x2 forward, x1, x2 right
@@ -75,7 +75,7 @@ SEEN_BY = ("vel_n", "vel_e", "vel_d", "tilt_n", "tilt_e", "heading", "height")
 
 
 class Rows:
-    """Hands out consecutive rows of a lane buffer."""
+    """Allocates consecutive rows of a lane buffer."""
 
     def __init__(self, first: int = 0) -> None:
         self.next = first
@@ -117,8 +117,8 @@ GYRO_SHARE = _rows.take(1)  # by how much the gyro's bias is in a flow reading w
 HYPOTHESES = _rows.take(1)  # in the first lane: how many faults are followed
 SIGNATURE = _rows.take(MOST_HYPOTHESES)  # what one unit of each adds to the reading at hand
 SHARE = _rows.take(MOST_HYPOTHESES)  # how much of the state's error the reading shows while the fault is there
-INFORMATION = _rows.take(MOST_HYPOTHESES)  # what innovations tell of its size [1 / its unit squared]
-SCORE = _rows.take(MOST_HYPOTHESES)  # that information times the size that they tell
+INFORMATION = _rows.take(MOST_HYPOTHESES)  # information of innovations on its size [1 / its unit squared]
+SCORE = _rows.take(MOST_HYPOTHESES)  # that information times the size that they show
 # within a step; beside the states stand the hypotheses
 SCRATCH = _rows.take(max(MOST_SOURCES * MOST_SOURCES, 3 * COLUMNS))  # a transition's own block of P, both triangles
 # and a correction's columns, in the same rows: none is done within the other

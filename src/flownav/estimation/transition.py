@@ -55,7 +55,7 @@ def _generated(plan: _Plan, lines: list[str]) -> Transition:
 
 
 class _Plan(NamedTuple):
-    """What a transition reads and changes, and the source of its pass, part by part.
+    """Plan of a transition: the states that it reads and changes, and the source of its pass, part by part.
 
     The block of P on its own states goes through SCRATCH, where element (row, column) of both triangles lies at
     `SCRATCH + column * width + row`, rows and columns counted along `sources`.

@@ -23,14 +23,14 @@ ON_EARTH = ("kml", "gpx")
 
 
 class Written(NamedTuple):
-    """What an export wrote: its files, and what the user should know of them, one line each."""
+    """Result of an export: its files, and notes on them for the user, one line each."""
 
     files: list[Path]
     notes: list[str]
 
 
 def destination(record: Path, to: str, out: Path | None) -> Path:
-    """The file or folder that an export goes to: `out`, or beside the record where unsaid.
+    """The file or folder that an export goes to: `out`, or next to the record where `out` is None.
 
     For TUM and EuRoC, NAME.tum stands for NAME_estimate.tum and so on. An `out` that is a folder takes a file
     under the record's name. InputError where `to` is no format.

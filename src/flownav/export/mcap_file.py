@@ -171,7 +171,9 @@ def _time(time_ns: int) -> Row:
 
 
 def _rows(table: Table) -> Iterator[Row]:
-    """A table's rows as JSON objects without the values that JSON cannot say: those not finite, and texts not there."""
+    """A table's rows as JSON objects without the values that JSON cannot hold: those not finite, and texts not
+    there.
+    """
 
     def said(value: Any) -> bool:
         return value is not None and not (isinstance(value, float) and not math.isfinite(value))

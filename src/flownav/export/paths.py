@@ -74,7 +74,7 @@ TEXTS = {".tum": (tum_text, marked), ".csv": (euroc_text, marked_table)}  # by s
 def write_poses(record: Record, path: Path, frame: str) -> tuple[list[Path], list[str]]:
     """Write each path of the record beside `path`, NAME_estimate and so on, all or none; the files and notes.
 
-    The suffix of `path` says the format: .tum or .csv (EuRoC). InputError where the record holds no path.
+    The suffix of `path` decides the format: .tum or .csv (EuRoC). InputError where the record holds no path.
     """
     paths = trajectories(record, frame)
     files = [path.with_name(f"{path.stem}_{one.name}{path.suffix}") for one in paths]
@@ -109,7 +109,7 @@ def origin_from(text: str) -> Origin:
 
 
 def origin_of(record: Record) -> Origin:
-    """Where the record's origin lies on the earth. InputError where it does not say."""
+    """Where the record's origin lies on the earth. InputError where it does not state it."""
     parameters = record.manifest.get("parameters")
     stated = parameters.get("origin_lat_lon_deg_alt_m") if isinstance(parameters, dict) else None
     if not isinstance(stated, list | tuple) or len(stated) != 3:
@@ -142,7 +142,7 @@ def tracks(record: Record, origin: Origin) -> tuple[list[Track], list[str]]:
 def write_earth(record: Record, path: Path, to: str, origin: Origin | None) -> tuple[list[Path], list[str]]:
     """Write the record's tracks as KML or GPX, whole or not at all; the file and notes.
 
-    origin: where the record's origin is; None takes the record's own. InputError where nobody says, or the record
+    origin: where the record's origin is; None takes the record's own. InputError where neither is stated, or the record
     holds no path.
     """
     found, notes = tracks(record, origin or origin_of(record))

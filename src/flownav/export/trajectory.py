@@ -1,4 +1,5 @@
-"""What writers take of a record: paths as poses, the estimate's error, whole numbers of time, tables as a folder.
+"""A record's contents as writers take them: paths as poses, the estimate's error, whole numbers of time, tables as a
+folder.
 
 Poses stand in NED/FRD or in ENU/FLU; the error, where the record holds a truth. Tables are Parquet or CSV files beside
 the manifest.json.
@@ -33,10 +34,10 @@ BOUND = ("three_sigma_n_m", "three_sigma_e_m", "three_sigma_d_m")
 class Trajectory(NamedTuple):
     """A path, rows in order of time.
 
-    name: of PATHS. t_s (n,); position_m (n, 3) in the earth frame; quaternion (n, 4)
-    w, x, y, z, body to earth; velocity_m_s (n, 3) in the earth frame, None where the record cannot tell;
-    oriented: False where no attitude was recorded and `quaternion` is level, facing north; row (n,): which row
-    of the record's table each is; left_out: how many rows had no finite time, position or attitude.
+    name: of PATHS. t_s (n,); position_m (n, 3) in the earth frame; quaternion (n, 4) w, x, y, z, body to earth;
+    velocity_m_s (n, 3) in the earth frame, None where the record has none; oriented: False where no attitude was
+    recorded and `quaternion` is level, facing north; row (n,): which row of the record's table each is; left_out: how
+    many rows had no finite time, position or attitude.
     """
 
     name: str
@@ -50,7 +51,7 @@ class Trajectory(NamedTuple):
 
     @property
     def notes(self) -> Iterator[str]:
-        """What a user should know of this path, one line each."""
+        """Notes on this path for the user, one line each."""
         if self.left_out:
             yield f"{self.name}: {self.left_out} of {self.left_out + len(self.t_s)} rows left out, not finite"
         if not self.oriented:

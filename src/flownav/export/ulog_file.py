@@ -164,7 +164,7 @@ def _number(log: bytes, found: ulog.Found, at: int) -> int:
 
 # -- the file -----------------------------------------------------------------------------------------------
 class Contents(NamedTuple):
-    """What goes into a log: topics, logged strings, texts about the whole log, and notes for the user."""
+    """Contents of a log: topics, logged strings, texts about the whole log, and notes for the user."""
 
     topics: list[ulog.Topic]
     strings: list[ulog.Stamped]
@@ -175,10 +175,10 @@ class Contents(NamedTuple):
 def write_ulog(record: Record, path: Path, original: Path | None = None) -> tuple[list[Path], list[str]]:
     """Write a ULog file, whole or not at all; the file and notes.
 
-    With `original`, the log that the record was replayed from, a copy of that log with flownav's topics among
-    its own, on its clock: the manifest's `clock_start_s` says what that showed at time 0 of the record. InputError
-    where the original is missing, is no ULog, is not the log that was replayed or does not overlap in time, or
-    where the record holds no path or does not say how its times lie on that clock.
+    With `original`, the log that the record was replayed from, a copy of that log with flownav's topics among its own,
+    on its clock: the manifest's `clock_start_s` is that clock's time at time 0 of the record. InputError where the
+    original is missing, is no ULog, is not the log that was replayed or does not overlap in time, or where the record
+    holds no path or does not say how its times lie on that clock.
     """
     if original is None:
         contents = _all_of(record)
@@ -215,7 +215,7 @@ def _all_of(record: Record) -> Contents:
 
 
 def _ours(record: Record, shift_s: float) -> Contents:
-    """What only flownav can say: paths, innovations, events."""
+    """Contents that only flownav has: paths, innovations, events."""
     paths = trajectories(record)
     notes = [note for path in paths for note in path._replace(oriented=True).notes]  # nothing stands in here
     for name, table in record.tables.items():
@@ -233,7 +233,7 @@ def _ours(record: Record, shift_s: float) -> Contents:
 
 
 def _clock_start_s(record: Record, original: Path) -> float:
-    """What the original's clock showed at time 0 of the record."""
+    """Time of the original's clock at time 0 of the record [s]. InputError where the record does not state it."""
     start_s = record.manifest.get("clock_start_s")
     if start_s is None:
         raise InputError(
@@ -243,7 +243,7 @@ def _clock_start_s(record: Record, original: Path) -> float:
 
 
 def _from_zero_on(contents: Contents) -> Contents:
-    """Contents without what lies before time 0 of the log's clock, which ULog cannot say; counted in the notes."""
+    """Contents without what lies before time 0 of the log's clock, which ULog cannot hold; counted in the notes."""
     topics = []
     for topic in contents.topics:
         kept = topic.time_us >= 0

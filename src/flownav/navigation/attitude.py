@@ -37,7 +37,7 @@ with_gap = replacing(ImuMemory, "gap")
 
 
 class MeasuredAttitude(NamedTuple):
-    """What the law of an attitude reads: a quaternion."""
+    """A quaternion, as the observation law of an attitude reads it."""
 
     w: float
     x: float
@@ -146,7 +146,7 @@ def judge_level(reading: Reading, start: StartMemory, *, axis: int, s: AttitudeS
 
 @procedure
 def take_level(work: Work, lanes: Lanes, t_s: float, sensor: int, s: AttitudeSettings, o: Output) -> None:
-    """Where an external attitude puts down, beside an IMU. While something horizontal aids the filter, it tells the
+    """Where an external attitude puts down, beside an IMU. While something horizontal aids the filter, it corrects the
     reading's slow error and nothing else; where nothing does it is taken.
     """
     smoothing = shared(work, lanes, CONSIDERS) == 0.0  # no state is merely considered then: it would move them all
@@ -164,7 +164,7 @@ def take_level(work: Work, lanes: Lanes, t_s: float, sensor: int, s: AttitudeSet
 
 @equation
 def consider_motion(work: Work, lanes: Lanes) -> None:
-    """An aided filter knows its motion better than the autopilot's attitude does; and down tells no heading."""
+    """An aided filter knows its motion better than the autopilot's attitude does; and down determines no heading."""
     consider_none(work, lanes)
     for state in range(FLOW_LAG):
         heads = state == ATTITUDE + 2 or state == GYRO_BIAS + 2 or state == INS_ERROR + 2

@@ -21,7 +21,7 @@ from flownav.navigation.verdicts import UNKNOWN_M, Event, Offer, Reset, on_lanes
 
 
 class BaroVerdict(NamedTuple):
-    """What becomes of a pressure height."""
+    """Verdict on a pressure height: memory, reset of the datum, event, and offer to the filter."""
 
     baro: BaroMemory
     reset: Reset
@@ -49,8 +49,9 @@ def judge_baro(
 
 @equation
 def consider_height(work: Work, lanes: Lanes) -> None:
-    """Pressure is no judge of the height of a vehicle that stands, or of which nobody knows yet: it settles then what
-    the barometer's offset is. One that began 10 m wrong had lifted a vehicle off its pad before the first window ended.
+    """Pressure is no judge of the height of a vehicle that stands, or not yet known to stand or to fly: it determines
+    the barometer's offset then. One that began 10 m wrong had lifted a vehicle off its pad before the first window
+    ended.
     """
     consider(work, lanes, POSITION + 2, GROUNDED)
     consider(work, lanes, VELOCITY + 2, GROUNDED)

@@ -1,4 +1,4 @@
-"""What is heard before the start: the newest attitude, the mean specific force, and the force as it is now."""
+"""Readings before the start: the newest attitude, the mean specific force, and the force as it is now."""
 
 from typing import NamedTuple
 
@@ -64,7 +64,7 @@ def note_attitude(reading: Reading, m: StartMemory, *, t_s: float) -> StartMemor
 
 
 class Levelled(NamedTuple):
-    """What an inertial reading before the start leaves."""
+    """Memories after an inertial reading before the start."""
 
     start: StartMemory
     imu: ImuMemory

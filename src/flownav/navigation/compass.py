@@ -1,9 +1,9 @@
-"""A heading that is read and wrong: two witnesses that know nothing of it contradict it alike.
+"""Detection of a wrong heading by two witnesses that do not use the compass and contradict it alike.
 
 The flow's velocity by the filter's own heading, and what the accelerometer integrates to by it, are both turned against
-GPS velocity and its changes by the heading's error. Where both say the same large angle, the compass is what errs: it
-is no longer heard, and the heading is sought from the course. Where only the flow says so, its axes may be wrong, and
-nothing is done.
+GPS velocity and its changes by the heading's error. Where both show the same large angle, the compass is wrong: it is
+no longer used, and the heading is sought from the course. Where only the flow shows it, the flow's axes may be wrong,
+and nothing is done.
 """
 
 from typing import NamedTuple
@@ -28,7 +28,7 @@ ALIKE_RAD = 0.6  # between the two witnesses: 34 deg
 LEAST_PUSH_M_S = 0.6  # root sum square of the changes; the difference of two GPS velocities has 0.57 of noise
 LEAST_LIKENESS = 0.6  # not measured
 FADING_S = 20.0  # not measured
-ONCE_MORE_M = 1.0  # of travel tells the heading again: within 8 deg in the same test
+ONCE_MORE_M = 1.0  # of travel determines the heading again: within 8 deg in the same test
 FREED_TILT_RAD = 0.1  # what a compass that pulled may have done; not measured
 FREED_ACCEL_M_S2 = 0.5  # not measured
 
@@ -60,21 +60,21 @@ def with_change(reading: Reading, t_s: float, m: PushMemory) -> PushMemory:
 
 @equation
 def faded(t_s: float, m: CourseMemory) -> CourseMemory:
-    """The sums of the course, of which what is long ago counts less."""
+    """The sums of the course, with less weight on older ones."""
     kept = exp(-smaller(t_s - m.gps_s, FADING_S) / FADING_S)
     return with_sums(m, along=kept * m.along, across=kept * m.across, gps=kept * m.gps, flow=kept * m.flow)
 
 
 @equation
 def judge_push(m: PushMemory) -> tuple[bool, float]:
-    """Whether the accelerometer says how the heading errs, and by how much: true less own [rad]."""
+    """Whether the accelerometer shows an error of the heading, and how large: true less own [rad]."""
     likeness, error_rad = turn_between(m.along, m.across, m.gps * m.own)
     return m.gps >= LEAST_PUSH_M_S * LEAST_PUSH_M_S and likeness >= LEAST_LIKENESS, error_rad
 
 
 @equation
 def refuted(course: CourseMemory, push: PushMemory) -> tuple[bool, float]:
-    """Whether both witnesses say that the heading is wrong by a large angle, and that by the flow [rad]."""
+    """Whether both witnesses show that the heading is wrong by a large angle, and the angle by the flow [rad]."""
     flow_knows, by_flow = judge_course(course)
     own_knows, by_own = judge_push(push)
     apart = within_half_turn(by_flow - by_own)
@@ -84,12 +84,12 @@ def refuted(course: CourseMemory, push: PushMemory) -> tuple[bool, float]:
 # -- on lanes -----------------------------------------------------------------------------------------------
 @on_lanes
 def note_push(force: Force, m: PushMemory, *, dt_s: float) -> PushMemory:
-    """What the step that was just made adds to the velocity, by the filter's own heading."""
+    """The block's memory with the velocity that the step just made adds, by the filter's own heading."""
     return with_push(m, push_n=m.push_n + dt_s * force.north_m_s2, push_e=m.push_e + dt_s * force.east_m_s2)
 
 
 class CompassVerdict(NamedTuple):
-    """What the two witnesses say of the compass, and what is set free where they refute it."""
+    """Verdict of the two witnesses on the compass, with the resets that free heading and states where it is refuted."""
 
     course: CourseMemory
     push: PushMemory

@@ -1,9 +1,9 @@
 """A heading that no sensor reads, found from the course: the flow's velocity turned onto that of GPS.
 
 As complex numbers, north + i east, the flow's velocity w by the filter's own heading and GPS velocity v differ by the
-heading's error: v = w exp(i error). The sum of v conj(w) over the way has the error as its angle, whatever it is;
-a Kalman filter, which takes errors for small, would lose itself where it is large. Until it is found nothing corrects
-the heading (`take.consider_datum`), and the flow, by whose variance so large a doubt counts, tells little.
+heading's error: v = w exp(i error). The sum of v conj(w) over the way has the error as its angle, whatever it is; a
+Kalman filter, which takes errors for small, would lose itself where it is large. Until it is found nothing corrects the
+heading (`take.consider_datum`), and the flow, by whose variance so large a doubt counts, gives little information.
 """
 
 from typing import NamedTuple
@@ -47,7 +47,7 @@ def with_flow(north_m_s: float, east_m_s: float, t_s: float, m: CourseMemory) ->
 
 @equation
 def with_gps(reading: Reading, t_s: float, m: CourseMemory) -> CourseMemory:
-    """The sums with one GPS velocity more, where the flow tells of the same motion."""
+    """The sums with one more GPS velocity, where the flow has measured the same motion."""
     v_n, v_e, w_n, w_e = reading.value_0, reading.value_1, m.north_m_s, m.east_m_s
     speed_m_s = np.sqrt(v_n * v_n + v_e * v_e)
     step_s = t_s - m.gps_s
@@ -71,14 +71,14 @@ def turn_between(along: float, across: float, power: float) -> tuple[float, floa
 
 @equation
 def judge_course(m: CourseMemory) -> tuple[bool, float]:
-    """Whether the way says how the heading errs, and by how much: true less own [rad]."""
+    """Whether the course shows an error of the heading, and how large: true less own [rad]."""
     likeness, error_rad = turn_between(m.along, m.across, m.gps * m.flow)
     return m.travel_m >= LEAST_TRAVEL_M and likeness >= LEAST_LIKENESS, error_rad
 
 
 @equation
 def is_velocity(reading: Reading) -> bool:
-    """Whether a GPS velocity is heard, and tells north and east."""
+    """Whether a GPS velocity was received, with finite north and east components."""
     return is_heard(reading) and bool(np.isfinite(reading.value_0 + reading.value_1))
 
 
@@ -116,7 +116,7 @@ def note_flow_course(
 
 
 class FoundHeading(NamedTuple):
-    """What the way says of the heading."""
+    """Result of the search for the heading in the course: memories, attitude, reset and event."""
 
     course: CourseMemory
     heading: HeadingMemory
@@ -129,7 +129,9 @@ class FoundHeading(NamedTuple):
 def find_heading(
     reading: Reading, heading: HeadingMemory, own: Attitude, m: CourseMemory, *, t_s: float
 ) -> FoundHeading:
-    """At a GPS velocity: where the way says how the heading errs, the heading and the velocity are turned by it."""
+    """At a GPS velocity: where the course shows an error of the heading, the heading and the velocity are turned by
+    it.
+    """
     counts = heading.sought > 0.0 and is_velocity(reading)
     after = with_gps(reading, t_s, m)
     knows, error_rad = judge_course(after)

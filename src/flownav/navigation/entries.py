@@ -1,4 +1,4 @@
-"""The entries of a smoother's journal, by name; the first number of each says which kind it is."""
+"""The entries of a smoother's journal, by name; the first number of each is its kind."""
 
 from typing import Annotated, Generic, NamedTuple, TypeVar
 

@@ -1,4 +1,4 @@
-"""What one unit of each fault adds to a reading of flow, and to a fix of GPS."""
+"""The change that one unit of each fault makes to a reading of flow, and to a GPS fix."""
 
 import numpy as np
 
@@ -65,7 +65,7 @@ def sign_flow(work: Work, lanes: Lanes, t_s: float, component: int, angular: boo
 def seen_by(
     work: Work, lanes: Lanes, lane: int, range_m: float, m: FlowSignMemory, angular: bool
 ) -> tuple[float, float]:
-    """What the sensor's two channels are to read by the filter [rad/s or m/s]."""
+    """The filter's prediction of the sensor's two channels [rad/s or m/s]."""
     v = load_velocity(work, lanes, lane)
     u, v, _ = to_body(rotation_of(work, lanes, lane), v.vel_n, v.vel_e, v.vel_d)
     return angular_flow(u, v, m.turning_x, m.turning_y, range_m) if angular else (u, v)

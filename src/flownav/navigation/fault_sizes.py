@@ -1,4 +1,4 @@
-"""Faults that nobody noticed: what sizes they have, what innovations tell of them, what they have done by now."""
+"""Sizes of undetected faults: the prior, the estimate from innovations, and the effect so far."""
 
 import numpy as np
 
@@ -24,7 +24,7 @@ SIZE_SIGMAS = 3.0  # of a fault's size: 0.3 % of a normal one lies beyond; 2.4 l
 
 @equation
 def prior_sigma(fault: int) -> float:
-    """What sizes such a fault has, in its unit."""
+    """Prior standard deviation of a fault's size, in the fault's unit."""
     if fault == FLOW_SCALE:
         return 0.3
     if fault == FLOW_AGE:
@@ -40,8 +40,8 @@ def prior_sigma(fault: int) -> float:
 
 @equation
 def least_size(fault: int) -> float:
-    """What is no fault yet. A scale that a filter learns in flight, and a gyro that warms up, are larger than the prior
-    (`flownav replay` of quad-px4flow-outdoor).
+    """Largest size that is not yet a fault. A scale that a filter learns in flight, and a gyro that warms up, are
+    larger than the prior (`flownav replay` of quad-px4flow-outdoor).
     """
     if fault == FLOW_SCALE:
         return 0.5
@@ -54,13 +54,13 @@ def least_size(fault: int) -> float:
 
 @equation
 def size_in(work: Work, lanes: Lanes, fault: int, lane: int) -> Size:
-    """What is known of a fault's size in a lane."""
+    """Estimated size of a fault in a lane, with its standard deviation and evidence."""
     return size_told(work, lanes, fault, lane, prior_sigma(fault))
 
 
 @equation
 def largest_size(fault: int, found: Size) -> float:
-    """What its innovations leave possible of a fault; one that is there or is not has a size of 1."""
+    """Largest size of a fault that its innovations leave possible; one that is there or is not has a size of 1."""
     size = abs(found.size) + SIZE_SIGMAS * found.sigma
     return size if fault < FLOW_SWAPPED else smaller(size, 1.0)
 

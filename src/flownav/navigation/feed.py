@@ -39,7 +39,9 @@ def equipment_of(
     streams: dict[Sensor, Stream], first_s: float, flow_gyro_is_imu: bool, settings: NavigatorSettingsFile,
     origin_deg_m: tuple[float, float, float] | None = None,
 ) -> Equipment:  # fmt: skip
-    """What the streams offer. first_s: from when the navigator waits for a fix; origin_deg_m: where on earth it is."""
+    """The equipment that the streams make up. first_s: from when the navigator waits for a fix; origin_deg_m: where on
+    earth it is.
+    """
     serves = imu_serves(streams)
     fixes = Sensor.GPS_POSITION in streams and bool(np.any(streams[Sensor.GPS_POSITION].quality > 0.0))
     return Equipment(

@@ -65,7 +65,7 @@ with_verdict = replacing(FlowMemory, "taken_s", "doubted", "wrong_s", "usual")
 
 # -- one component ------------------------------------------------------------------------------------------
 class FlowOffer(NamedTuple):
-    """A component of flow: what is offered, what its law is held against, and the gyro's bias in that."""
+    """A component of flow: the offer, the value that its law is compared with, and the gyro's bias in that."""
 
     offer: Offer
     measured: Measured
@@ -86,7 +86,7 @@ def offer_component(
 ) -> FlowOffer:
     """One component without turning and gain error, with its variance. A down velocity that no sensor has is NaN.
 
-    All that is said of the noise is said of what the sensor reports: the sensor file's law, which is of the residuals
+    Every stated noise is that of the value as the sensor reports it: the sensor file's law, which is of the residuals
     about gain times velocity, the settings, and a variance that a reading states. So the gain is taken off both.
     """
     raw, listed = component_of(reading, component)
@@ -142,7 +142,7 @@ class Freed(NamedTuple):
 def free_velocity(
     tested: Tested, look: Look, gps: GpsMemory, before: FlowInnovation, m: FlowMemory, *, t_s: float, angular: bool
 ) -> Freed:
-    """Flow that is refused again and again, and nothing else tells the velocity: then that is what is wrong."""
+    """Doubts that free the velocity where flow is refused again and again and no other sensor measures it."""
     refused = tested.reason == INNOVATION_GATE
     again = tested.innovation * before.innovation > 0.0  # spikes are not alike
     freed = refused and m.ratio > DOUBTED_RATIO and not holds(gps, t_s) and again
@@ -168,7 +168,7 @@ def walk_alone(
 
 
 class Agreement(NamedTuple):
-    """What a reading of flow leaves: whether it is doubted or trusted anew."""
+    """Memories and event after a reading of flow was found to agree or not: it is doubted, or trusted anew."""
 
     held: HeldBack
     flow: FlowMemory
@@ -177,7 +177,7 @@ class Agreement(NamedTuple):
 
 @on_lanes
 def judge_agreement(look: Look, reading: Reading, m: FlowMemory, *, t_s: float) -> Agreement:
-    """Say that flow is doubted, and that it is trusted again; note when it was tested last. No other is held back."""
+    """Write the event that flow is doubted, or trusted again; note when it was tested last. No other is held back."""
     if look.reason != FUSED:
         return Agreement(HeldBack(0.0), m, NO_EVENT)
     doubted = lasting_doubt(m.doubted, m.ratio)
@@ -233,9 +233,9 @@ def take_flow(
 
 @equation
 def consider_others(work: Work, lanes: Lanes) -> None:
-    """What flow depends on and is no judge of: over a step of the ground it would move the height, and by accelerations
-    that err it would turn the heading; its scale is learnt where GPS holds (`judge_scale`).
-    Where GPS tells the velocity too, that is what corrects the rest.
+    """Consider states that flow depends on and must not correct: over a step of the ground it would move the height,
+    and by accelerations that err it would turn the heading; its scale is learnt where GPS holds (`judge_scale`). Where
+    GPS measures the velocity too, GPS corrects the rest.
     """
     consider(work, lanes, POSITION + 2, RANGE_MISSING)
     consider(work, lanes, GROUND, RANGE_MISSING)

@@ -81,7 +81,9 @@ def sum_looks(reading: Reading, m: FlowSum, *, t_s: float) -> Summed:
 
 @equation
 def gyro_share(reading: Reading) -> float:
-    """By how much the filter's gyro bias is in the turning: the IMU told it, or is what the sensor's gyro follows."""
+    """Share of the filter's gyro bias in the turning: 1 where the turning is the IMU's, or the sensor's gyro is held to
+    the IMU's; else 0.
+    """
     return 1.0 if np.isfinite(reading.value_4 + reading.value_5) else 0.0
 
 
@@ -92,7 +94,7 @@ def turning_of(
     """The turning that the flow saw [rad/s]: its own gyro less its bias, or the vehicle's IMU over the exposure.
 
     bias_x, bias_y: the filter's gyro bias, which the IMU's mean has. A sensor's own gyro is followed against the IMU,
-    but not where it has no data: it may say zero then for its gyro too.
+    but not where it has no data: it may report zero then for its gyro too.
     """
     imu_x, imu_y = reading.value_4 - bias_x, reading.value_5 - bias_y
     own_x, own_y = reading.value_2, reading.value_3
@@ -115,7 +117,7 @@ def turning_of(
 def see_ground(
     below: GroundBelow, ranged: RangeMemory, echo: EchoMemory, ground: GroundMemory, *, t_s: float, s: FlowSettings
 ) -> Look:
-    """The ground that the lens sees, and whether a range tells the height over it; the rest is not known yet."""
+    """The ground that the lens sees, and whether a range measures the height over it; the rest is not known yet."""
     range_m = lens_range(below.rotation, below.height_m, (0.0, 0.0, s.flow_below_m))[0]
     spread_m = np.sqrt(larger(below.variance, 0.0))
     known = ground.known > 0.0 and spread_m <= LARGEST_SPREAD * range_m

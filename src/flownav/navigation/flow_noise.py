@@ -1,5 +1,5 @@
-"""The noise of a flow reading: what the sensor file or the settings say of what the sensor reports, and what the
-innovations show, as a factor.
+"""The noise of a flow reading: the noise of the sensor's reports by the sensor file or the settings, and a factor by
+the innovations.
 """
 
 import numpy as np
@@ -19,7 +19,7 @@ AGREEMENT_S = 1.0  # chosen, held by test_judges; integrity.md has what it makes
 DOUBTED_RATIO, TRUSTED_RATIO = 4.0, 2.0
 # a reversed flow agrees as the speed passes through 0; fused then, it went 20 m off beside GPS (test_protection)
 DOUBT_S = 5.0
-LONGEST_STEP_S = 1.0  # chosen: readings further apart say nothing of each other
+LONGEST_STEP_S = 1.0  # chosen: readings further apart are independent
 FULL_QUALITY = 255.0
 LEAST_RANGE_M = 0.05  # keeps a share finite: no flow is fused so near
 LEAST_STEP_S = 1e-3  # keeps a division finite
@@ -45,8 +45,8 @@ def flow_variance(range_m: float, speed_m_s: float, quality: float, angular: boo
 
 @equation
 def disputed_variance(look: Look, speed_m_s: float) -> float:
-    """What a height errs by makes of an angular flow's velocity [m2/s2]: the share by which the newest range disputes
-    it. speed_m_s: as reported.
+    """Variance of an angular flow's velocity due to an error of the height [m2/s2]: the speed times the share by which
+    the newest range disputes that height, squared. speed_m_s: as reported.
 
     Over a table's edge, or a ledge, flow and range see different ground for a moment, and neither is known to be below.
     """
@@ -62,7 +62,7 @@ def blindness(quality: float, usual: float) -> float:
 
 @equation
 def blind_variance(range_m: float, quality: float, usual: float, step_s: float, s: FlowSettings) -> float:
-    """What is added where a sensor sees less than half as well as it usually does [m2/s2], of what it reports.
+    """Variance added where a sensor's quality is less than half of its usual one [m2/s2], in what it reports.
 
     Ground without texture is read as ground that stands still, however often it is read: such an error lasts, and does
     not average out as noise does.
@@ -121,7 +121,7 @@ def lasting_doubt(doubted: float, ratio: float) -> float:
 @equation
 def alike(innovation: float, before: float, total: float) -> float:
     """The product of two innovations of a component, one after the other, over their variance: 0 on average for noise
-    of any size, 1 and more for what is wrong in the same way. None counts as more than 2.5 standard deviations.
+    of any size, 1 and more for innovations with the same error. None counts as more than 2.5 standard deviations.
     """
     limit = np.sqrt(LARGEST_CHANGE * total)
     return clamp(innovation, -limit, limit) * clamp(before, -limit, limit) / total
@@ -140,7 +140,7 @@ def wrong_since(t_s: float, likeness: float, wrong_s: float) -> float:
 
 @equation
 def lasting_walk(range_m: float, speed_m_s: float, s: FlowSettings) -> float:
-    """The walk of a position that flow alone tells [m2/s]: 2 e^2 tau of a velocity error e that lasts for tau.
+    """The walk of a position that flow alone determines [m2/s]: 2 e^2 tau of a velocity error e that lasts for tau.
 
     White noise averages out, and what lasts of a flow's error does not: a part as of a gyro, over the range, and a part
     of the speed.

@@ -48,16 +48,18 @@ SOON_S = 1.0  # with 7 s a flow of the wrong sign carried the vehicle 84 m off, 
 JUMPED_S = 60.0
 LEAPT_RATIO = 4.0  # twice the gate: chosen; what a flow of the wrong sign leads away creeps out of it
 MOMENT_S = 1.5  # chosen: seven fixes of 5 Hz, in which flow and accelerometer cannot lose the way
-UNKNOWN_PAD_M = 100.0  # as good as unknown: the tie to the vehicle that follows tells it
+UNKNOWN_PAD_M = 100.0  # as good as unknown: the tie to the vehicle that follows determines it
 LEAST_PAD_VARIANCE_M2 = 1e-6  # chosen: 1 mm, so that a tie is never exact
 
 with_fused = replacing(RejectionMemory, "fused_s")
 with_reset = replacing(GpsMemory, "told_s", "moved_n_m", "moved_e_m")
 
 
-# -- what the filter says -------------------------------------------------------------------------------------
+# -- the filter's estimates -------------------------------------------------------------------------------------
 class AlongAxis(NamedTuple):
-    """What the filter says along an axis, NED: position [m], velocity [m/s], and how far off the pad is [m, m2]."""
+    """The filter's estimate along an axis, NED: position [m], velocity [m/s], and the pad's offset with its variance
+    [m, m2].
+    """
 
     position_m: float
     velocity_m_s: float
@@ -67,7 +69,7 @@ class AlongAxis(NamedTuple):
 
 @equation
 def along_axis(work: Work, lanes: Lanes, axis: int, lane: int) -> AlongAxis:
-    """What the filter says along an axis of a lane."""
+    """The filter's estimate along an axis of a lane."""
     position_m = row_of(work, lanes, STATE + POSITION + axis, lane)
     both = variance_of(work, lanes, POSITION + axis, lane) + variance_of(work, lanes, PAD + axis, lane)
     variance = both - 2.0 * covariance_of(work, lanes, PAD + axis, POSITION + axis, lane)
@@ -89,7 +91,7 @@ def judge_fix(
 ) -> Offer:
     """One axis of a fix: the variance is the white part of its noise, and a share of the accuracy that it states.
 
-    North and east are judged together; alone: whatever the other axis says.
+    North and east are judged together; alone: without regard to the other axis.
     """
     value, stated = component_of(reading, axis)
     white_position = s.gps_white_sigma_down_m if axis == 2 else s.gps_white_sigma_m
@@ -103,8 +105,8 @@ def judge_fix(
 
 @equation
 def lag_variance(start: StartMemory, steady: SteadyForce, s: GpsSettings) -> float:
-    """What a receiver's smoothing leaves over in its velocity [m2/s2]: the lag that is estimated (`gps_velocity`) is
-    one number for a smoothing that is none, and leaves a share LAG_LEFT of its doubt times the acceleration.
+    """Variance of a GPS velocity due to the receiver's smoothing [m2/s2]: the lag that is estimated (`gps_velocity`) is
+    one number, which a smoothing is not, and leaves a share LAG_LEFT of its doubt times the acceleration.
     """
     lag_s = LAG_LEFT * s.gps_velocity_lag_sigma_s if start.started > 0.0 else 0.0
     return lag_s * lag_s * squared_acceleration(steady)
@@ -121,7 +123,9 @@ def follow_fix_noise(
     tested: Tested, start: StartMemory, steady: SteadyForce, m: NoiseMemory,
     *, t_s: float, place: int, s: GpsSettings,
 ) -> NoiseMemory:  # fmt: skip
-    """After the test: an axis that was fused teaches its white noise; what a lag leaves over lasts, and is none."""
+    """After the test: an axis that was fused teaches its white noise; the rest of a lag lasts, and is no white
+    noise.
+    """
     if tested.reason != FUSED:
         return m
     white = tested.variance - (0.0 if place < OF_GPS + 3 else lag_variance(start, steady, s))
@@ -149,7 +153,7 @@ def judge_rejections(
     """Whether GPS has been refused for a state so often and so long that the filter is wrong, and the count.
 
     ratio: its test ratio where it is refused, else 0. position: or else it is a velocity, for which SOON_S is long
-    enough, as it is where flow, which else would hold the filter, is doubted. seen: flow that nobody doubts, or along
+    enough, as it is where flow, which else would hold the filter, is doubted. seen: flow that is not doubted, or along
     down the range, has carried the state since GPS was fused last. If that was a moment before the first refusal, it is
     GPS that jumped: for JUMPED_S it is not followed. A velocity must have leapt out of its gate for that: a flow of the
     wrong sign leads one away, too.
@@ -183,7 +187,7 @@ def gone_to_gps(
 
 
 class FixFate(NamedTuple):
-    """What follows from the fate of a fix along an axis. pad_goes: the pad is tied to the vehicle anew."""
+    """Consequences of a fix's fate along an axis. pad_goes: the pad is tied to the vehicle anew."""
 
     memory: FixMemory
     goes: tuple[Reset, Reset, Reset]
@@ -201,7 +205,7 @@ def judge_fate(
     """After the test: where GPS has been refused again and again for a state, the filter is wrong: it goes to GPS.
 
     An axis that is refused for the other's sake alone does not count. Where the position goes, the pad goes along:
-    flow, which nobody doubts, tells how far it is from there.
+    flow, which is not doubted, measures how far it is from there.
     """
     m, gps, pad = memory
     position, axis = place < 3, place if place < 3 else place - 3
@@ -216,7 +220,7 @@ def judge_fate(
     after = with_fused(after, fused_s=t_s) if tested.reason == FUSED else after
     goes = heard and reset
     by = value - (along.position_m if position else along.velocity_m_s)
-    moved = by if goes and position else 0.0  # whether GPS jumped or the filter was wrong, nobody knows
+    moved = by if goes and position else 0.0  # whether GPS jumped or the filter was wrong is unknown
     pad_goes = goes and position and not doubted and pad.known > 0.0
     return FixFate(
         FixMemory(

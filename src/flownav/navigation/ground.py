@@ -1,4 +1,4 @@
-"""What lies below, ground and pad: how much less sure it is after a step.
+"""Growth of the uncertainty of ground and pad over a step.
 
 The ground walks with new ground that passes below. And what lasts in a sensor's error changes with the height: a range
 that is wrong by a share e puts the ground e h off, a camera that looks past its axis by e sees its pad e h beside its
@@ -47,7 +47,7 @@ def lasting_walk(height_m: float, drift: DriftMemory, sigma: float) -> float:
 
 
 class WalkedBelow(NamedTuple):
-    """What lies below after a step."""
+    """Memory and doubts of ground and pad after a step."""
 
     drift: DriftMemory
     walked: tuple[Doubt, Doubt, Doubt, Doubt]

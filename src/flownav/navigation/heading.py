@@ -40,7 +40,7 @@ def heading_variance(t_s: float, m: HeadingMemory, s: AttitudeSettings) -> float
 
 
 class HeadingVerdict(NamedTuple):
-    """What becomes of a heading."""
+    """Verdict on a heading: memory and offer."""
 
     heading: HeadingMemory
     offer: Offer
@@ -65,7 +65,7 @@ def offered_heading(
 
 
 class Weighed(NamedTuple):
-    """A heading that was held against its gate: its fate, the variance to fuse it with, and what is doubted."""
+    """A heading tested by its gate: its fate, the variance to fuse it with, and the doubts."""
 
     fate: Fate
     noise: Noise
@@ -80,9 +80,9 @@ def weigh_heading(
     """The gate is that of one heading, however often it is read: an error that lasts lets none pass that is far off.
 
     Headings that stay refused contradict what the filter learnt of those before, which may have been wrong as well.
-    Where GPS holds, it tells the heading by the course, and the headings' own lasting error is doubted by the
+    Where GPS holds, it determines the heading by the course, and the headings' own lasting error is doubted by the
     contradiction. Without it the filter's heading is doubted, and so is that error where headings had agreed for more
-    than a moment: which of them is wrong nothing tells then.
+    than a moment: nothing shows then which of them is wrong.
     """
     sound = fate.reason == FUSED
     beyond = sound and tested.innovation * tested.innovation > gate_sigma * gate_sigma * tested.total

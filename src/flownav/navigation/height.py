@@ -53,7 +53,7 @@ from flownav.navigation.verdicts import (
 from flownav.navigation.vibration import doubted_imu
 
 # Logs are those of ../shared/data; a stray is a range that neither of the two before it confirms.
-# Refused so long, a range that alone tells the height is believed, not the accelerometer: chosen; at once, a lone echo
+# Refused so long, a range that alone gives the height is believed, not the accelerometer: chosen; at once, a lone echo
 # would make the accelerometer doubted.
 DOUBTING_S = 0.05
 LEANING_SHARE = 0.5  # of a range that is fused in the mean of those before it
@@ -65,8 +65,8 @@ STRAYS_OVER_RANGES = 20.0  # chosen; nine that agree then end a step of the grou
 MANY_STRAYS = 0.15  # sonars that jump have 0.11 (outdoor-3) and 0.78 (outdoor-2) of strays, sound ones 0.02 at most
 UNSEEN_M_S = 1.0  # climb or descent that a repeated range may hide: chosen, what it weighs is held by test_judges
 LONGEST_REPEAT_S = 2.0  # a still hover repeats one value for 1.9 s (outdoor), a range beyond reach for 2.1 (outdoor-3)
-SERVED_S = 1.0  # believing a range that says the same from the first on, 436 of 480 gusty approaches land; else 455
-UNAIDED_TRAVEL_RATIO = 5.0  # times the travel, where nothing else tells the height: chosen, held by test_judges
+SERVED_S = 1.0  # believing a range that is constant from the first on, 436 of 480 gusty approaches land; else 455
+UNAIDED_TRAVEL_RATIO = 5.0  # times the travel, where nothing else measures the height: chosen, held by test_judges
 
 
 with_value = replacing(RangeMemory, "last_m", "same_s", "down_m")
@@ -87,18 +87,19 @@ def range_variance(range_m: float, sigma_m: float, relative_sigma: float) -> flo
 
 @equation
 def repeated_variance(variance: float, lasting_s: float) -> float:
-    """Variance of a range [m2] that has been the same to the last digit for so long: what may have gone unseen."""
+    """Variance of a range [m2] that has repeated one value for lasting_s, with the change that may be undetected."""
     unseen_m = UNSEEN_M_S * lasting_s
     return variance + unseen_m * unseen_m
 
 
 @equation
 def repeats(t_s: float, m: RangeMemory, height: Height, alone: bool, s: HeightSettings) -> bool:
-    """Whether the range has repeated one value to the last digit for long: no news, and not what a vehicle does.
+    """Whether the range has repeated one value to the last digit for so long that it carries no information and no
+    vehicle does so.
 
     In a still hover a sensor of 1 cm repeats itself for a second or two, and is right; it served until then. One that
-    says the same from the first on, or while the height travels, or for ever, is out of its reach, or stuck.
-    Where no barometer, GPS or pad has told the height lately, the range is all there is, and it is believed unless
+    repeats a value from the first reading on, or while the height travels, or for ever, is out of its reach, or stuck.
+    Where no barometer, GPS or pad has measured the height lately, the range is all there is, and it is believed unless
     the height travels by more than the filter's own drift.
     """
     lasting_s = t_s - m.same_s
@@ -114,7 +115,7 @@ def repeats(t_s: float, m: RangeMemory, height: Height, alone: bool, s: HeightSe
 def range_verdict(
     reading: Reading, t_s: float, started: float, height: Height, alone: bool, m: RangeMemory, s: HeightSettings
 ) -> tuple[int, float, RangeMemory]:
-    """Verdict, variance and what is remembered of one range [m] along the boresight."""
+    """Verdict, variance and memory of one range [m] along the boresight."""
     range_m = reading.value_0
     stated = reading.variance_0
     variance = stated if np.isfinite(stated) else range_variance(range_m, s.range_sigma_m, s.range_relative_sigma)
@@ -147,8 +148,8 @@ def judge_ground(below_m: float, range_m: float, t_s: float, alone: bool, g: Gro
     """Whether ranges in a row agree on a ground that is new, and the memory of it.
 
     One echo finds no ground. A range that repeats itself to the last digit must do so for long: a vehicle that stands
-    reads so, and so does a sensor that holds an old value for a moment. Where nothing else tells the height, the first
-    range must serve, before the vertical speed is lost.
+    reads so, and so does a sensor that holds an old value for a moment. Where nothing else measures the height, the
+    first range must serve, before the vertical speed is lost.
     """
     agrees = g.agreeing > 0.0 and abs(below_m - g.candidate_m) <= AGREEMENT_M + AGREEMENT_SHARE * range_m
     since_s = g.since_s if agrees else t_s
@@ -190,7 +191,7 @@ def sought_ground(
 
 
 class RangeVerdict(NamedTuple):
-    """What becomes of a range."""
+    """Verdict on a range: memory, events, reset, sign of an offset, and offer."""
 
     memory: RangingMemory
     stuck: Event
@@ -229,7 +230,7 @@ def judge_range(
 
 
 class Refusal(NamedTuple):
-    """What follows from the fate of a range. again: the ground was found anew, and the reading is offered once more."""
+    """Consequences of a range's fate. again: the ground was found anew, and the reading is offered once more."""
 
     fate: Fate
     memory: RangingMemory
@@ -249,10 +250,10 @@ def judge_refusal(
 ) -> Refusal:  # fmt: skip
     """After the test: a range that is refused first makes the accelerometer doubted, then the ground new.
 
-    The accelerometer is doubted where the range crept out of its gate and stays out, or alone tells the height.
-    A streak of refusals ends where the sensor says something else. The ground is found anew where ranges agree on it
-    for long, and where they do not, its candidate is followed; a vehicle that stands stands on the ground it has.
-    Whether it was a step of the ground or the height was wrong, nobody knows: by so much the height may be off.
+    The accelerometer is doubted where the range crept out of its gate and stays out, or alone measures the height. A
+    streak of refusals ends where the sensor reads something else. The ground is found anew where ranges agree on it for
+    long, and where they do not, its candidate is followed; a vehicle that stands stands on the ground it has. Whether
+    it was a step of the ground or the height was wrong, nobody knows: by so much the height may be off.
     """
     m, echo, g = memory
     fused, refused = tested.reason == FUSED, tested.reason == INNOVATION_GATE
@@ -316,6 +317,6 @@ def take_range(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Ou
     conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
     watch_whiteness(work, lanes, t_s, 2)
     follow_noise(work, lanes, t_s, OF_RANGE, s.gate_sigma)
-    if judge_refusal(work, lanes, t_s, s, o):  # the ground was found anew: the reading that said so is fused
+    if judge_refusal(work, lanes, t_s, s, o):  # the ground was found anew: the reading that showed it is fused
         range_along_boresight(work, lanes, 0, s.range_below_m, s.range_forward_m, s.range_right_m)
         fuse_offered(work, lanes, s.gate_sigma, o)

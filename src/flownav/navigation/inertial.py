@@ -58,35 +58,35 @@ def size_of(r: Reading) -> float:
 
 @equation
 def said_by(reading: Reading) -> Motion:
-    """What an inertial reading says."""
+    """Body rate [rad/s] and specific force [m/s2] of an inertial reading."""
     return (reading.value_0, reading.value_1, reading.value_2, reading.value_3, reading.value_4, reading.value_5)
 
 
 @equation
 def remembered(m: ImuMemory) -> Motion:
-    """What the newest one that was kept said."""
+    """Body rate [rad/s] and specific force [m/s2] of the newest reading that was kept."""
     return (m.gyro_x, m.gyro_y, m.gyro_z, m.accel_x, m.accel_y, m.accel_z)
 
 
 @equation
 def without_tones(motion: Motion, m: ToneMemory) -> Motion:
-    """What a reading says without the tones that were heard in it."""
+    """A reading's motion less the tones that were found in it."""
     return (motion[0], motion[1], motion[2], motion[3] - m.taken_x, motion[4] - m.taken_y, motion[5] - m.taken_z)
 
 
 @equation
 def told_noise(least: float, whole: float, left: float, s: ImuSettings) -> float:
-    """Density of the accelerometer's noise [m/s2/sqrt(Hz)]: as told, or more where its readings show more: their whole
-    power, or what the notches leave of it.
+    """Density of the accelerometer's noise [m/s2/sqrt(Hz)]: as stated, or more where its readings show more: their
+    whole power, or what the notches leave of it.
     """
     return larger(least, np.sqrt(left if is_notched(s) else whole))
 
 
 @equation
 def turning_noise(turn_rad_s: float, power: float, s: ImuSettings) -> float:
-    """Density squared of the gyro's noise [rad2/s]: what is told, or more where its readings show more (power), and
-    what turning about body down makes of its scale. A rotor's tone, which comes back within its
-    period, turns nothing: what it shows is not counted.
+    """Density squared of the gyro's noise [rad2/s]: as stated, or more where its readings show more (power), plus the
+    effect of its scale error while turning about body down. A rotor's tone, which comes back within its period, turns
+    nothing: what it shows is not counted.
 
     An error of scale or alignment is a lasting share of what is turned, and the tilt that it makes of a turn comes back
     as the heading does: white noise of the time that a swing lasts.
@@ -98,8 +98,8 @@ def turning_noise(turn_rad_s: float, power: float, s: ImuSettings) -> float:
 
 @equation
 def motion_between(before: Motion, now: Motion, integrates: float) -> Motion:
-    """What stands for the time between two inertial readings: their mean (trapezium), or the later one of a unit that
-    integrates over that time itself.
+    """The motion between two inertial readings: their mean (trapezium), or the later one of a unit that integrates over
+    that time itself.
     """
     share = 1.0 if integrates > 0.5 else 0.5
     rest = 1.0 - share
@@ -125,12 +125,12 @@ class Paid(NamedTuple):
 def paid(
     between: float, held: float, spent: float, owed: float, step_s: float, period_s: float, now: bool, moving: bool
 ) -> Paid:
-    """What moves the filter over step_s such that the integral over each inertial period is as read.
+    """The motion applied over step_s, such that the integral over each inertial period is as read.
 
     Between two inertial readings the filter stops at other sensors' instants, moved there by the reading that it holds.
-    What that spent is taken off what the next reading says of its whole period, and the rest is paid over the rest of
-    the period, or, where that is too short, over the step after it. Without this, vibration that an IMU integrates
-    over its period would enter the velocity cut into pieces, as a random walk.
+    The part applied so far is taken off the next reading's integral over its whole period, and the rest is paid over
+    the rest of the period, or, where that is too short, over the step after it. Without this, vibration that an IMU
+    integrates over its period would enter the velocity cut into pieces, as a random walk.
     """
     spent = spent if moving else 0.0
     owed = owed if moving else 0.0
@@ -142,7 +142,7 @@ def paid(
 
 
 class StepMotion(NamedTuple):
-    """What moves the filter over a step, and how sure that is."""
+    """The motion that moves the filter over a step, with its noise."""
 
     step: MotionStep
     applied: AppliedMotion
@@ -156,7 +156,8 @@ def judge_motion(
     reading: Reading, start: StartMemory, memory: MotionMemory, blocks: ForceBlocks, doubt: AccelFactors,
     *, t_s: float, step_s: float, heard: bool, s: ImuSettings,
 ) -> StepMotion:  # fmt: skip
-    """What moves the filter over the step to t_s: the readings at its ends, the newest reading, or none.
+    """The motion that moves the filter over the step to t_s, from the readings at its ends, the newest reading, or
+    none.
 
     heard: an inertial reading is at hand; where none ever is, none stands for the step. After a gap it knows nothing of
     the gap, which is coasted. Where no time passes there is no gap.

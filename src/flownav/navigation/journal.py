@@ -1,4 +1,4 @@
-"""What a smoother needs of a run, written as it happens: predictions, corrections, resets, decays, and the estimates.
+"""A smoother's journal of a run, written as it happens: predictions, corrections, resets, decays, and the estimates.
 
 A journal of no rows is written nowhere and only counts; that is what a run without a smoother has. It is of one lane.
 """

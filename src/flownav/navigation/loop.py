@@ -27,7 +27,7 @@ STATED_VARIANCES = 3  # variances that a reading carries
 
 
 class Running(NamedTuple):
-    """A navigator at work on one lane: what it was told, its lane buffer, and the tape it writes."""
+    """A navigator at work on one lane: its settings, its lane buffer, and the tape it writes."""
 
     told: NavigatorSettings
     settings: Array
@@ -46,7 +46,7 @@ Instead = Callable[[Running], int]  # the address of what takes a navigator's re
 def start_navigator(
     equipment: Equipment, settings: NavigatorSettingsFile, tape: Tape, noise: FlowNoise = NO_STATED_NOISE
 ) -> Running:
-    """A navigator that has heard nothing. noise: what a sensor file says of the flow's."""
+    """A new navigator. noise: the flow's noise by a sensor file."""
     headed = equipment.heading in (FROM_MAG, FROM_ATTITUDE) or equipment.use_attitude
     told = settings.settings(equipment, noise)
     sigma = settings.start_sigma(
@@ -56,7 +56,7 @@ def start_navigator(
 
 
 def run(queue: EventQueue, on: Running, *, compiled: bool = True, instead: int | None = None) -> None:
-    """Feed every event of the queue, in its order, and write what becomes of it onto the tape.
+    """Feed every event of the queue, in its order, and write the results onto the tape.
 
     compiled False: in plain Python, step by step (tests; it is a thousand times slower). instead: the address of what
     takes the readings in place of the navigator (`navigation.take.UNIT_SIGNATURE`).

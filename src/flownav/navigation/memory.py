@@ -1,4 +1,4 @@
-"""What a navigator remembers of each lane beside the filter's state: one named record a subject, and its rows.
+"""Memory of a navigator in each lane, beyond the filter's state: one named record a subject, and its rows.
 
 `work` holds the filter's rows first (`estimation.states`), then these: the reading that is being taken, the
 memories, and a few scalars that all lanes share, since the schedule of readings is the same in all of them.
@@ -62,7 +62,7 @@ from flownav.navigation.records import (
     WhitenessMemory,
 )
 
-UNHELD_S = 1.0  # without a fix of GPS, nothing but flow tells the velocity: chosen as PX4's time to dead reckoning
+UNHELD_S = 1.0  # without a fix of GPS, nothing but flow measures the velocity: chosen as PX4's time to dead reckoning
 
 MEMORY = Layout(FILTER_ROWS)
 MEMORY.name(PositionNed, *(STATE + POSITION + i for i in range(3)))
@@ -153,7 +153,7 @@ _FRESH: dict[int, tuple[float, ...]] = {
 
 
 def new_work(lanes: Lanes, *, faults: bool = True) -> Array:
-    """The lane buffer of a navigator that has heard nothing, (WORK_ROWS * len(lanes),).
+    """The lane buffer of a new navigator, (WORK_ROWS * len(lanes),).
 
     faults: whether it follows what faults would do; that changes no bit of its estimate.
     """
@@ -181,13 +181,13 @@ def share(work: Work, lanes: Lanes, row: int, value: float) -> None:
 
 @equation
 def holds(gps: GpsMemory, t_s: float) -> bool:
-    """Whether GPS told the level velocity or place lately."""
+    """Whether GPS measured the horizontal velocity or position lately."""
     return t_s - gps.told_s <= UNHELD_S
 
 
 @equation
 def held_by_gps(work: Work, lanes: Lanes, lane: int, t_s: float) -> bool:
-    """Whether GPS told the level velocity or place of a lane lately."""
+    """Whether GPS measured a lane's horizontal velocity or position lately."""
     return holds(load_gps(work, lanes, lane), t_s)
 
 

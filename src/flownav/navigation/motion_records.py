@@ -1,6 +1,6 @@
-"""What a navigator remembers of its motion, as named records: inertial readings, spikes, windows, courses, pushes.
+"""Memory of a navigator's motion as named records: inertial readings, spikes, windows, courses, pushes.
 
-A field's default is what it is before anything was heard.
+A field's default is its value before the first reading.
 """
 
 from math import inf, nan
@@ -37,9 +37,9 @@ class ImuMemory(NamedTuple):
 
 class StandMemory(NamedTuple):
     """does: what the vehicle did in the last window, `still.MOVES`, SHAKEN or RESTS; contact_m: the range when it
-    rested last, NaN where it has not; last_m: the last range of all, NaN before the first; windows: how many, one
-    after the other, in which it did that; grounded: 1 while it stands, and until the first window tells; gps_m_s: the
-    fastest level velocity by GPS in the last window.
+    rested last, NaN where it has not; last_m: the last range of all, NaN before the first; windows: how many, one after
+    the other, in which it did that; grounded: 1 while it stands, and until the first window ends; gps_m_s: the fastest
+    level velocity by GPS in the last window.
     """
 
     does: float = 0.0
@@ -108,9 +108,9 @@ class ImuWindow(NamedTuple):
 
 
 class SeenWindow(NamedTuple):
-    """What else was read in a window: lowest and highest range [m] (the highest below 0: none), the newest, how many,
-    and the sum of squares of what changes between two [m2]; sums of the flow's velocity [m/s] and of how many, and the
-    fastest level velocity by GPS [m/s].
+    """The other readings of a window: lowest and highest range [m] (the highest below 0: none), the newest, their
+    number, and the sum of squared changes between two [m2]; sums of the flow's velocity [m/s] and the number of flow
+    readings, and the fastest horizontal velocity by GPS [m/s].
     """
 
     range_low_m: float = 1e9
@@ -126,7 +126,7 @@ class SeenWindow(NamedTuple):
 
 class CourseMemory(NamedTuple):
     """The way as GPS and the flow saw it, weighed by time: sums of v.w and v x w [m2/s], and of both squares; its
-    length [m]; when GPS was heard and the flow [s]; the flow's smoothed velocity by the filter's own heading [m/s].
+    length [m]; when GPS and flow were received [s]; the flow's smoothed velocity by the filter's own heading [m/s].
     """
 
     along: float = 0.0
@@ -141,7 +141,7 @@ class CourseMemory(NamedTuple):
 
 
 class PushMemory(NamedTuple):
-    """What the accelerometer adds to the velocity in a block, north and east by the filter's own heading [m/s]; GPS
+    """The velocity that the accelerometer adds in a block, north and east by the filter's own heading [m/s]; GPS
     velocity at its start, and when that was [s]; sums over blocks as of `CourseMemory`, of changes of velocity [m2/s2].
     """
 
@@ -163,7 +163,7 @@ class MotionStep(NamedTuple):
 
 
 class SpentMotion(NamedTuple):
-    """What moved the filter since the last inertial reading: body rate [rad] and specific force [m/s], integrated."""
+    """The motion applied since the last inertial reading: body rate [rad] and specific force [m/s], integrated."""
 
     gyro_x: float = 0.0
     gyro_y: float = 0.0
@@ -174,7 +174,9 @@ class SpentMotion(NamedTuple):
 
 
 class OwedMotion(NamedTuple):
-    """What past readings said and no step was long enough to pay, integrated like `SpentMotion`."""
+    """The motion of past readings that is still to be applied, since no step was long enough, integrated like
+    `SpentMotion`.
+    """
 
     gyro_x: float = 0.0
     gyro_y: float = 0.0
@@ -186,9 +188,9 @@ class OwedMotion(NamedTuple):
 
 class ToneMemory(NamedTuple):
     """Tones of the rotor and of its blades in the newest inertial reading's specific force [m/s2], body FRD: each as a
-    phasor, the value at hand and that a quarter turn away; what both notches take off the reading; by how much the
-    tones are faster than told [Hz]; the power density of the noise that is left [m2/s3]; the level changes
-    from one reading to the next, without tones; and the smoothed force.
+    phasor, the value at hand and that a quarter turn away; the sum that both notches take off the reading; by how much
+    the tones are faster than stated [Hz]; the power density of the noise that is left [m2/s3]; the level changes from
+    one reading to the next, without tones; and the smoothed force.
     """
 
     rotor_x: float = 0.0

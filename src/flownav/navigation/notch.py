@@ -3,11 +3,11 @@
 A tone at f integrates to a velocity that swings by A/(2 pi f): 1.5 m/s2 at 24 Hz are 10 mm/s, more than a flow sensor
 errs by near the ground, and the same error at each reading. A notch is a phasor that turns with the tone and is drawn
 towards what is read (an all-pass in a loop: Regalia, Mitra, Vaidyanathan, Proc. IEEE 76, 1988); a steady force passes
-whole. Where the phasor is drawn backwards turn after turn, the rotor turns slower than it is said to: its speed is
-followed (a phase-locked loop: Gardner, Phaselock Techniques, 3rd ed., chapter 2).
+whole. Where the phasor is drawn backwards turn after turn, the rotor turns slower than stated: its speed is followed (a
+phase-locked loop: Gardner, Phaselock Techniques, 3rd ed., chapter 2).
 
-What is left tells how noisy the unit is in this vehicle: datasheets do not know (0.16 to 0.24 m/s2 above 5 Hz in real
-flights, where the shipped sheet leaves 0.01: docs/explanation/validation.md).
+The rest shows how noisy the unit is in this vehicle, which datasheets do not state (0.16 to 0.24 m/s2 above 5 Hz in
+real flights, where the shipped sheet leaves 0.01: docs/explanation/validation.md).
 """
 
 import math
@@ -23,7 +23,7 @@ LEAST_NOTCH_HZ = 8.0  # chosen: a notch below would take the vehicle's own motio
 WIDTH = 6.0  # f over the width at -3 dB; chosen: 2 and 4 take more of a touchdown's jolt (test_notch)
 SPEED_S = 1.0  # chosen: the rotor's speed is found in seconds, and a governor moves it slower
 MOST_OFF = 0.1  # chosen: a tone further off is another rotor's
-LEAST_TONE_M_S2 = 0.1  # chosen: a weaker tone tells no speed
+LEAST_TONE_M_S2 = 0.1  # chosen: a weaker tone determines no speed
 STEADY_S = 0.03  # chosen: 0.3 takes a sway of 1 m/s2 at 1 Hz for noise, three times too much (test_notch)
 Force = tuple[float, float, float]  # specific force [m/s2], body FRD
 
@@ -45,8 +45,8 @@ class Tone(NamedTuple):
 
 
 class Freed(NamedTuple):
-    """What the notches take off a value, and the phasors after it; how far each tone is ahead of its phasor, times the
-    phasor's square.
+    """The part that the notches take off a value, and the phasors after it; how far each tone is ahead of its phasor,
+    times the phasor's square.
     """
 
     taken: float
@@ -58,7 +58,7 @@ class Freed(NamedTuple):
 
 @equation
 def is_notched(s: ImuSettings) -> bool:
-    """Whether a tone is told."""
+    """Whether the settings state a tone's frequency."""
     return s.notch_rotor_hz > 0.0 or s.notch_blades_hz > 0.0
 
 
@@ -105,9 +105,9 @@ def freed(value: float, rotor: Tone, blades: Tone, turn: Turn, blades_turn: Turn
 
 @equation
 def followed_hz(tone_hz: float, off_hz: float, ahead: float, square: float) -> float:
-    """By how much a tone is faster than told. ahead, square: of its phasors, over the axes.
+    """The amount by which a tone is faster than stated [Hz]. ahead, square: of its phasors, over the axes.
 
-    A tone that is faster by d runs 2 pi d dt ahead in each step, and by so much its phasors are drawn forwards.
+    A tone that is faster by d runs 2 pi d dt ahead in each step, and its phasors are drawn forwards by as much.
     """
     ahead_rad = ahead / (square + LEAST_TONE_M_S2 * LEAST_TONE_M_S2)
     return clamp(off_hz + ahead_rad / (2.0 * math.pi * SPEED_S), -MOST_OFF * tone_hz, MOST_OFF * tone_hz)

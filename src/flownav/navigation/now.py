@@ -1,10 +1,10 @@
-"""The state of now: the filter's, carried on by the inertial readings that wait, with what is known of its errors.
+"""The state of now: the filter's, carried on by the inertial readings that wait, with the statistics of its errors.
 
-A navigator is fed with a delay, so that readings of old instants find their place; what is sent, and what an autopilot
-flies on, must be of now. One step is `carried`, the very law that moves the filter (`estimation.motion.strapdown`), on
-one lane here and on the simulator's.
+A navigator is fed with a delay, so that readings of old instants find their place; the state that is sent, and that an
+autopilot uses, must be of now. One step is `carried`, the very law that moves the filter
+(`estimation.motion.strapdown`), on one lane here and on the simulator's.
 
-The rows of `NowRow` are what a program on board is told and what `live` sends.
+A program on board receives the rows of `NowRow`, and `live` sends them.
 """
 
 from typing import Annotated, Generic, NamedTuple, TypeVar
@@ -63,7 +63,7 @@ class NowRow(NamedTuple, Generic[Value]):
     triangles row by row: of north, east, down [m] and roll, pitch, yaw [rad]; of the velocity in earth's axes and in
     the body's; of the gyro's bias [(rad/s)^2]. protection_m: levels, horizontal and vertical; NaN where none are kept.
     aid_age_s: since something horizontal was fused, NaN before the start; aid: 0, 1 dead reckoning, 2 invalid.
-    suspected: 0, or 1 and the number of the fault that innovations tell of (`hypotheses.NAMES`).
+    suspected: 0, or 1 and the number of the fault that innovations show (`hypotheses.NAMES`).
     """
 
     status: Value

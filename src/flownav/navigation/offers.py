@@ -1,4 +1,4 @@
-"""Offering one component to the filter on lanes: the test, what is written of it, and what follows for the aids."""
+"""Offering one component to the filter on lanes: the test, the row written of it, and its effect on the aids."""
 
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ from flownav.navigation.told import AidSettings
 from flownav.navigation.verdicts import Accepted, Event, Fate, Noise, Observation, Offered, Tested, on_lanes
 
 CLOCK_SLACK_S = 1e-6  # the tick of logged times
-LIKE_READINGS = 4.0  # so many readings after one another err alike: chosen; what it gives, integrity.md has
+LIKE_READINGS = 4.0  # number of successive readings that err alike: chosen; its effect stands in integrity.md
 FEW_STRAYS = 0.02  # sound ranges have 0.013 (mocap) and 0.02 (e-steps) at most, those that jump 0.11 and 0.78
 STRAY_SHARE = 1.5  # some strays confirm each other: chosen; halved or doubled it fails test_strays
 STRAY_SPAN_M = 5.0  # chosen: sonars' neighbours are 3.2 and 3.7 m apart at most (outdoor-2 and -3)
@@ -35,7 +35,7 @@ with_height = replacing(AidMemory, "height_s")
 
 
 class LeftBehind(NamedTuple):
-    """What is written down of a reading that comes too late to be taken."""
+    """The row written for a reading that comes too late to be taken."""
 
     fate: Fate
     observation: Observation
@@ -73,13 +73,13 @@ def too_old(work: Work, lanes: Lanes, t_s: float, sensor: int, o: Output) -> boo
 # -- one component ----------------------------------------------------------------------------------------
 @on_lanes
 def observe_innovation(tested: Tested) -> Observation:
-    """The difference that a law finds is what is written down of an attitude."""
+    """Write the difference that a law finds as the observation of an attitude."""
     return Observation(tested.innovation)
 
 
 @procedure
 def conclude(work: Work, lanes: Lanes, t_s: float, sensor: int, component: int, gate_sigma: float, o: Output) -> None:
-    """Test, fuse and write down the component whose law stands in the observation rows; REASON says what became of it.
+    """Test, fuse and write down the component whose law stands in the observation rows; REASON holds the outcome.
 
     What no lane offers corrects nothing and costs nothing, and its innovation is computed for the tape alone.
     """
@@ -95,7 +95,7 @@ def offer_what_is_sound(fate: Fate) -> Offered:
 
 @on_lanes
 def note_refusal(fate: Fate, tested: Accepted) -> Fate:
-    """INNOVATION_GATE where what was offered was not fused."""
+    """INNOVATION_GATE where the offer was not fused."""
     return Fate(INNOVATION_GATE if fate.reason == FUSED and tested.accepted == 0.0 else fate.reason)
 
 
@@ -114,7 +114,7 @@ def fuse_offered(work: Work, lanes: Lanes, gate_sigma: float, o: Output) -> None
 # -- a place as a whole -----------------------------------------------------------------------------------
 @equation
 def gate_ratio(tested: Tested, gate_sigma: float) -> float:
-    """The square of the innovation over what the gate lets pass."""
+    """The square of the innovation over the largest that the gate passes."""
     return tested.innovation * tested.innovation / (gate_sigma * gate_sigma * tested.total)
 
 
@@ -156,7 +156,7 @@ class Strays(NamedTuple):
 
 @on_lanes
 def look_for_strays(echo: EchoMemory) -> Strays:
-    """Whether strays are so many that a range must be weighed."""
+    """Whether strays are so frequent that a range must be weighed."""
     return Strays(Offered(0.0), echo.stray > FEW_STRAYS)
 
 
@@ -177,7 +177,7 @@ def weigh_strays(work: Work, lanes: Lanes) -> None:
 
 # -- horizontal aid ---------------------------------------------------------------------------------------
 class Aided(NamedTuple):
-    """The aid at hand noted, and that the position is told again."""
+    """The aid at hand noted, and the event that the position is aided again."""
 
     aid: AidMemory
     again: Event
@@ -193,12 +193,12 @@ def note_aid(fate: Fate, aid: AidMemory, *, t_s: float) -> Aided:
 
 @on_lanes
 def note_height(fate: Fate, aid: AidMemory, *, t_s: float) -> AidMemory:
-    """Something other than the range told the height in the lanes whose reason is FUSED."""
+    """The memory after something other than the range measured the height, in the lanes whose reason is FUSED."""
     return with_height(aid, height_s=t_s if fate.reason == FUSED else aid.height_s)
 
 
 class AidAge(NamedTuple):
-    """What follows from how long ago the last aid was."""
+    """Consequences of the time since the last aid: memory and events."""
 
     aid: AidMemory
     reckoning: Event

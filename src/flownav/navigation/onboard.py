@@ -1,4 +1,4 @@
-"""The whole live path behind a C interface: readings wait, are fed when they are due, and the state of now is told.
+"""The whole live path behind a C interface: readings wait, are fed when they are due, and the state of now is returned.
 
 A call does a bounded amount of work. A reading's way through the navigator is done in parts (`take`), as many in a call
 as its budget has room for; what is left is done in the next. Nothing raises: a status is returned. What is fed, and in
@@ -132,7 +132,7 @@ def begin_reading(work: Work, lanes: Lanes, r: Work, p: Work, o: Output, place: 
 
 @equation
 def cost_of(work: Work, m: Progress) -> float:
-    """What the next part costs."""
+    """Cost of the next part, in units of the call's budget."""
     if m.part == ADVANCING:
         return COST_OF_STEP * min(m.steps, STEPS_A_CALL) + COST_OF_ARRIVING
     if m.part == TAKING:
@@ -185,7 +185,7 @@ def come_closer(work: Work, lanes: Lanes, m: Progress, p: Work, o: Output) -> No
 
 @procedure
 def go_away(work: Work, lanes: Lanes, m: Progress, p: Work, o: Output) -> None:
-    """What follows the reading; then the next may come."""
+    """Do the work that follows a reading; then the next may come."""
     go_on(work, lanes, m.t_s, p, o)
     store_progress(work, ONE_LANE, 0, with_part(m, part=IDLE))
 
@@ -206,7 +206,7 @@ def mixed(found: np.uint64, value: float) -> np.uint64:
 
 @procedure
 def digest_of(work: Work) -> float:
-    """64 bits over everything that a navigator knows and remembers, as the bits of a float; not over its scratch."""
+    """64 bits over the whole memory of a navigator, as the bits of a float; not over its scratch."""
     found = MIXED
     for i in range(SCRATCH):
         found = mixed(found, work[i])
@@ -217,7 +217,7 @@ def digest_of(work: Work) -> float:
 
 # -- units --------------------------------------------------------------------------------------------------
 class OutcomeHead(NamedTuple, Generic[Value]):
-    """What became of a call. status: of the reading (`STATUSES`). parts: how many parts of readings' ways were done; 0:
+    """Outcome of a call. status: of the reading (`STATUSES`). parts: how many parts of readings' ways were done; 0:
     there is nothing to do. waiting: how many readings wait or are under way. innovations, events: how many rows follow.
     """
 
@@ -235,7 +235,7 @@ ROOM = (0, MOST_INNOVATIONS, MOST_EVENTS, 0, 0)
 
 
 def begin_board(work: Work, rings: Work, p: Work) -> None:
-    """A navigator that has heard nothing. The rings' sizes stand in their first numbers; all else may be anything."""
+    """Begin a new navigator. The rings' sizes stand in their first numbers; all else may be anything."""
     store_queue(rings, ONE_LANE, 0, NOTHING_WAITS)
     begin_anew(work, rings, p)
 

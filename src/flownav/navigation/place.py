@@ -43,7 +43,7 @@ CARRIED_M = 0.1  # chosen, not measured; 0.05 m stays and 0.15 m goes along (tes
 # has seen it
 NEVER_STOOD, STOOD_ON, LEFT, SEEN = -1.0, 1.0, 2.0, 3.0
 
-# Above the ground of any vehicle that stands on it: chosen; `windows` tells how fast one is that does.
+# Above the ground of any vehicle that stands on it: chosen; `windows` has the speed of one that does.
 ALOFT_M = 1.0
 
 with_landed = replacing(AidMemory, "landed")
@@ -60,7 +60,7 @@ class Pad(NamedTuple):
 
 
 class Sight(NamedTuple):
-    """What the law of a pad fix reads: tangents forward and right, and the distance [m]."""
+    """A pad fix as its observation law reads it: tangents forward and right, and the distance [m]."""
 
     forward: float
     right: float
@@ -73,7 +73,7 @@ MEMORY.name(Sight, *(MEASURED + i for i in range(3)))
 
 @equation
 def pad_at(north_m: float, east_m: float, down_m: float, goes: bool) -> tuple[Reset, Reset, Reset]:
-    """The pad is there, as far as anyone knows."""
+    """Resets that put the pad at a place of unknown certainty, where `goes` holds."""
     unknown = UNKNOWN_M * UNKNOWN_M
     return (
         Reset(PAD if goes else -1, north_m, unknown),
@@ -87,8 +87,8 @@ def pad_at(north_m: float, east_m: float, down_m: float, goes: bool) -> tuple[Re
 def judge_pose(
     reading: Reading, start: StartMemory, m: LevelMemory, *, axis: int, alone: bool, s: PlaceSettings
 ) -> Offer:
-    """One axis of an external position, as sure as it says or is told. North and east are judged together; alone:
-    whatever the other axis says.
+    """One axis of an external position, with the variance that it states or the settings' own. North and east are
+    judged together; alone: without regard to the other axis.
     """
     value, stated = component_of(reading, axis)
     variance = stated if np.isfinite(stated) else s.pose_sigma_m * s.pose_sigma_m
@@ -138,7 +138,7 @@ def judge_pad(reading: Reading, component: int, started: float, s: PlaceSettings
 
 @equation
 def late_variance(velocity: VelocityNed, m: ImuMemory, distance_m: float, component: int, s: PlaceSettings) -> float:
-    """What an instant that is stamped wrongly makes of a pad fix [m2]: how far the pad passes by meanwhile."""
+    """Variance of a pad fix due to an error of its time stamp [m2]: the square of the pad's travel meanwhile."""
     u, v, w = velocity
     turning = (m.gyro_x * m.gyro_x + m.gyro_y * m.gyro_y) * distance_m * distance_m if component < 2 else 0.0
     return s.pad_time_sigma_s * s.pad_time_sigma_s * (u * u + v * v + w * w + turning)
@@ -183,8 +183,8 @@ def judge_sight(
     reading: Reading, start: StartMemory, velocity: VelocityNed, m: ImuMemory, fix: LevelMemory,
     *, component: int, alone: bool, s: PlaceSettings,
 ) -> PadOffer:  # fmt: skip
-    """One component of a pad fix. All three are judged together: what is not the pad may lie in line with it along one
-    of them, and there its lever would turn the heading. alone: whatever the others say.
+    """One component of a pad fix. All three are judged together: an object that is not the pad may lie in line with it
+    along one of them, and there its lever would turn the heading. alone: without regard to the others.
     """
     reason, fixed = judge_pad(reading, component, start.started, s)
     variance = fixed + late_variance(velocity, m, reading.value_2, component, s)
@@ -207,7 +207,9 @@ def count_refusals(fate: Fate, m: PadMemory) -> PadMemory:
 
 @procedure
 def take_pad(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
-    """The pad from the lens. Its place is a state: the first fix finds it, every one tells both it and the vehicle."""
+    """The pad from the lens. Its place is a state: the first fix finds it, every one corrects both it and the
+    vehicle.
+    """
     s = load_place_settings(p)
     find_pad(work, lanes, t_s, s, o)
     for component in range(3):
@@ -233,21 +235,21 @@ def see_pad(work: Work, lanes: Lanes, component: int, alone: bool, s: PlaceSetti
 # -- at rest ------------------------------------------------------------------------------------------------
 @equation
 def is_aloft(seen: SeenWindow, m: StandMemory) -> bool:
-    """Whether a vehicle flies that is said to have landed: a range, a receiver or the flow says so."""
+    """Whether a vehicle that is reported to have landed still flies: by a range, a receiver or the flow."""
     range_m = seen.range_high_m if seen.range_high_m >= 0.0 else m.last_m
-    flow_m_s = flow_speed(seen) if range_m >= 0.0 else 0.0  # over a height that nobody told it is no speed
+    flow_m_s = flow_speed(seen) if range_m >= 0.0 else 0.0  # over an unknown height it is no speed
     return range_m > ALOFT_M or larger(seen.gps_m_s, m.gps_m_s) >= RESTING_GPS_M_S or flow_m_s >= RESTING_FLOW_M_S
 
 
 @on_lanes
 def disbelieve_landed(reading: Reading, seen: SeenWindow, m: StandMemory) -> Reading:
-    """One that flies has not landed, whatever is said."""
+    """The reading, not landed where the vehicle flies, whatever it reports."""
     return with_landing(reading, value_0=0.0 if is_aloft(seen, m) else reading.value_0)
 
 
 @on_lanes
 def note_landed(reading: Reading, aid: AidMemory) -> AidMemory:
-    """Whether the vehicle is on the ground, by the newest that was said."""
+    """The memory of whether the vehicle is on the ground, by the newest report."""
     return with_landed(aid, landed=reading.value_0 if reading.arrived > 0.0 else aid.landed)
 
 
@@ -274,7 +276,7 @@ def stand_on_pad(
     reading: Reading, start: StartMemory, position: PositionNed, pad: Pad, m: PadMemory, *, t_s: float
 ) -> Standing:
     """The place of take-off is the pad until a camera sees one: a state tied to the vehicle's own while it stands, so
-    that what GPS later tells of the one it tells of the other, and the way back is known better than either. A
+    that what GPS later corrects in one it corrects in the other, and the way back is known better than either. A
     vehicle that is carried about before its flight takes the pad along; one that has flown lands where it lands.
     """
     sound = usable(reading, reading.value_0, 0.0, start.started) == FUSED
@@ -304,7 +306,7 @@ def tie_to_pad(reading: Reading, m: PadMemory) -> Offer:
 @procedure
 def take_landed(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
     """On the ground: no velocity, and before a flight the pad is where the vehicle stands. In flight, nothing; nor
-    where a range, a receiver or the flow says that it flies: whoever says "landed" is one witness among them.
+    where a range, a receiver or the flow shows that it flies: a report of "landed" is one witness among them.
     """
     s = load_place_settings(p)
     for axis in range(3):

@@ -1,7 +1,7 @@
-"""A navigator on board beside its filter: what it is told, how far it has come, its beginning, and what it makes of a
-reading's time.
+"""A navigator on board beyond its filter: its settings, its progress, its beginning, and the instant that it gives to a
+reading.
 
-What waits stands in `waiting`, what is done with it in `onboard`.
+Waiting readings stand in `waiting`, and `onboard` processes them.
 """
 
 from typing import NamedTuple
@@ -46,10 +46,10 @@ IDLE, ADVANCING, TAKING, LEAVING, CLOSING = 0.0, 1.0, 2.0, 3.0, 4.0
 
 
 class Pace(NamedTuple):
-    """What a navigator on board is told beside its settings: how far behind the newest reading an instant is when it is
-    fed [s]; a leap of time that is not believed at once [s]; one after which the navigator begins anew [s]; how long
-    it waits for a fix from its first reading on [s], NaN where the equipment's deadline says it. protects: 1, or 0 for
-    one that follows no faults and keeps no protection levels, which changes nothing of its state.
+    """Settings of a navigator on board beyond those of its filter: how far behind the newest reading an instant is when
+    it is fed [s]; a leap of time that is not believed at once [s]; one after which the navigator begins anew [s]; how
+    long it waits for a fix from its first reading on [s], NaN where the equipment's deadline states it. protects: 1, or
+    0 for one that follows no faults and keeps no protection levels, which changes nothing of its state.
     """
 
     horizon_s: float = 0.27
@@ -92,7 +92,7 @@ waiting_until = replacing(Equipment, "deadline_s")
 
 
 def fresh_rows() -> tuple[Array, Array]:
-    """Which rows of a navigator that has heard nothing are not 0, and what stands there."""
+    """The rows of a new navigator that are not 0, and their values."""
     work = new_work(ONE_LANE)[:BOARD_ROWS].reshape(-1, 1)
     BOARD.put_fresh(work)
     places = np.flatnonzero(work[:, 0] != 0.0)
@@ -105,7 +105,7 @@ FRESH_ROWS, FRESH_VALUES = fresh_rows()
 # -- the beginning ------------------------------------------------------------------------------------------
 @procedure
 def begin_anew(work: Work, r: Work, p: Work) -> None:
-    """A navigator that has heard nothing, and rings in which nothing waits."""
+    """Begin a new navigator, with rings in which nothing waits."""
     for i in range(BOARD_ROWS):
         work[i] = 0.0
     for i in range(len(FRESH_ROWS)):

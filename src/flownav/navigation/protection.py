@@ -32,7 +32,7 @@ from flownav.navigation.memory import (
 from flownav.navigation.records import Levels
 from flownav.navigation.rows import position_variance
 
-# What these make together is measured (make integrity, integrity.md), none of them alone.
+# Their joint effect is measured (make integrity, integrity.md), none of them alone.
 OWN_ERROR_SIGMAS = 4.0  # of the filter's own error, where nothing fails: no step of the clean flights lies above
 OWN_DOWN_SIGMAS = 2.5  # of the height: 2.48 at most, with sensors drawn for each flight (tools/height_over_sigma.py)
 SIGMAS_BESIDE = 2.0  # of it, beside a fault

@@ -11,12 +11,12 @@ from flownav.navigation.records import Reading
 
 (FUSED, INNOVATION_GATE, NO_DATA, NOT_FINITE, OUT_OF_RANGE, NO_HEIGHT, TILTED, BEFORE_START, DATUM, OUTAGE,
  DUPLICATE, LATE, STUCK, NEAR_GROUND, NOT_NEEDED, AHEAD, NO_HEADING) = map(int, Reason)  # fmt: skip
-SILENT = -1  # nothing is said of this component in this lane: there was no reading, or the filter has not started
+SILENT = -1  # no row for this component in this lane: there was no reading, or the filter has not started
 
 
 @equation
 def is_heard(reading: Reading) -> bool:
-    """Whether a reading is there for one who only listens: it arrived, has data and is not withheld."""
+    """Whether a reading is there for a memory that only watches: it arrived, has data and is not withheld."""
     return reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
 
 
@@ -40,10 +40,10 @@ def usable(reading: Reading, value: float, variance: float, started: float) -> i
 
 @equation
 def usable_in_flight(reading: Reading, value: float, variance: float, started: float) -> int:
-    """What `usable` says, of a sensor of which nothing is said before the start."""
+    """The reason by `usable`, or SILENT before the start, for a sensor that writes no row before the start."""
     return SILENT if started == 0.0 else usable(reading, value, variance, started)
 
 
 HORIZONTAL = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.POSE)
-# A reading that knows nothing, or that another serves for, is no alarm; these are.
+# A reading without data, or that another serves for, is no alarm; these are.
 REFUSALS = (Reason.INNOVATION_GATE, Reason.NOT_FINITE, Reason.DUPLICATE, Reason.LATE, Reason.STUCK, Reason.AHEAD)

@@ -1,6 +1,6 @@
-"""What a navigator remembers of each lane, subject by subject, as named records; `memory` says where they lie.
+"""Memory of a navigator in each lane, subject by subject, as named records; `memory` holds where they lie.
 
-A field's default is what it is before anything was heard.
+A field's default is its value before the first reading.
 """
 
 from math import inf, nan
@@ -32,8 +32,8 @@ class Reading(NamedTuple):
 
 class StartMemory(NamedTuple):
     """started: 1 once the filter runs. Before that, the newest attitude that was read and its time [s], the mean
-    specific force [m/s2] of so many readings, the mean square of an axis about it [m2/s4], when the first came [s], and
-    the specific force without its vibration (body FRD [m/s2]).
+    specific force [m/s2] and the number of its readings, the mean square of an axis about it [m2/s4], when the first
+    came [s], and the specific force without its vibration (body FRD [m/s2]).
     """
 
     started: float = 0.0
@@ -55,8 +55,8 @@ class StartMemory(NamedTuple):
 
 class AidMemory(NamedTuple):
     """aided_s: when something horizontal was fused last; flag: 0, 1 dead reckoning, 2 invalid; height_s: when something
-    other than the range told the height; landed: 1 on the ground; aided: 1 where something horizontal was fused lately
-    as an external attitude was read.
+    other than the range measured the height; landed: 1 on the ground; aided: 1 where something horizontal was fused
+    lately as an external attitude was read.
     """
 
     aided_s: float = nan
@@ -162,8 +162,8 @@ class FlowInnovation(NamedTuple):
 
 
 class Look(NamedTuple):
-    """What the flow reading at hand saw: the vehicle's turning [rad/s]; the range from the lens to the ground along the
-    boresight by the filter [m], and known: 1 where that is well known; R_33; unranged: 1 where no range tells the
+    """The flow reading at hand: the vehicle's turning [rad/s]; the range from the lens to the ground along the
+    boresight by the filter [m], and known: 1 where that is well known; R_33; unranged: 1 where no range measures the
     height of the flow now: none lately, or a disputed one, or strays; by how much the newest range disputes that height
     [m]; the verdict on the whole reading (`reasons`); and unscaled: 1 where nothing absolute is at hand that the flow's
     scale could be learnt against.
@@ -198,8 +198,8 @@ class HeadingMemory(NamedTuple):
 
 
 class NoiseMemory(NamedTuple):
-    """factor: a component's noise over what is said of it [variance]; its innovation before, when that was [s], and how
-    many have taught it.
+    """factor: a component's noise over its stated noise [variance]; its innovation before, when that was [s], and the
+    number of innovations that it was estimated from.
     """
 
     factor: float = 1.0
@@ -211,7 +211,7 @@ class NoiseMemory(NamedTuple):
 class WhitenessMemory(NamedTuple):
     """A block of innovations along one body axis: since when [s], their sum in standard deviations, how many. The mean
     of the blocks before, the mean square of blocks, and when the last ended [s]; factor: how many times noisier than
-    told the accelerometer is along that axis.
+    stated the accelerometer is along that axis.
     """
 
     since_s: float = 0.0
@@ -230,7 +230,7 @@ class LevelMemory(NamedTuple):
 
 
 class GpsMemory(NamedTuple):
-    """told_s: when GPS told north or east last; moved_n_m and moved_e_m: how far resets to GPS moved the position,
+    """told_s: when GPS last measured north or east; moved_n_m and moved_e_m: how far resets to GPS moved the position,
     back and forth added up.
     """
 
@@ -241,7 +241,7 @@ class GpsMemory(NamedTuple):
 
 class PadMemory(NamedTuple):
     """known: 0 where the pad is not, or how it is: NEVER_STOOD, STOOD_ON, LEFT, SEEN of `place`; refusals: of fixes in
-    a row; aloft_s: since when one that stood nowhere is said to fly.
+    a row; aloft_s: since when a vehicle that stood nowhere is reported to fly.
     """
 
     known: float = 0.0
@@ -261,8 +261,8 @@ class RejectionMemory(NamedTuple):
 
 
 class FlowSignMemory(NamedTuple):
-    """What the flow sensor was to read at the reading before, by the filter [rad/s or m/s]; the turning that it saw
-    then [rad/s]; and the speed of both channels together over the ground, turning and all [m/s].
+    """The filter's prediction of the flow at the reading before [rad/s or m/s]; the turning that it saw then [rad/s];
+    and the speed of both channels together over the ground, turning and all [m/s].
     """
 
     read_x: float = 0.0
@@ -292,7 +292,7 @@ class Levels(NamedTuple):
 
 
 class ScaleDoubt(NamedTuple):
-    """Standard deviation of a flow scale that nothing can tell; 0 where the filter learns it."""
+    """Standard deviation of a flow scale that nothing determines; 0 where the filter learns it."""
 
     sigma: float = 0.0
 

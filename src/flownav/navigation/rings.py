@@ -1,7 +1,8 @@
-"""A program's link with a navigator: readings as they are handed over, and the rings on which they wait.
+"""A program's link with a navigator: readings as they are passed to it, and the rings on which they wait.
 
-What waits, is due and is told is `waiting`, `turning` and `now`, as on board; here they are called from Python. A
-`Rings` is what a live session has; `export.onboard.board.Board` is the library whole, with its navigator.
+Waiting readings, due readings and the state of now are the work of `waiting`, `turning` and `now`, as on board; here
+they are called from Python. A `Rings` is what a live session has; `export.onboard.board.Board` is the library whole,
+with its navigator.
 """
 
 from collections.abc import Iterable, Iterator
@@ -35,7 +36,7 @@ ORDERS = 1 << 15  # more than wait at any time
 
 
 class Given(NamedTuple):
-    """A reading as it is handed over: when it arrived, its sensor, the numbers of `waiting_records.BoardReading`."""
+    """A reading as it is passed in: when it arrived, its sensor, the numbers of `waiting_records.BoardReading`."""
 
     t_s: float
     sensor: int
@@ -55,7 +56,7 @@ def numbers_of(
 
 
 def given_of(queue: EventQueue) -> Iterator[Given]:
-    """What a navigator was fed, as readings that arrive as they are: no delay, the turning already found."""
+    """The readings that a navigator was fed, as readings that arrive without delay, with the turning already found."""
     for k in range(len(queue.t_s)):
         withheld = queue.withheld[k] if queue.arrived[k] > 0.0 else SILENT
         numbers = numbers_of(queue.value[k], queue.variance[k], queue.quality[k], withheld=withheld)
@@ -72,7 +73,7 @@ class Due(NamedTuple):
 class Rings:
     """Readings that wait for their instant; inertial ones stay, for the turning over an exposure and the way to now.
 
-    most: how many `release` hands over at a time.
+    most: how many `release` gives at a time.
     """
 
     def __init__(self, sizes: Sizes, most: int) -> None:
@@ -111,7 +112,7 @@ class Rings:
         return int(_take_back(self.rings, since_s))
 
     def waiting(self) -> EventQueue:
-        """What waits, as it was read; it goes on waiting."""
+        """The waiting readings as they were read; they stay on the rings."""
         queue = empty_queue(len(self))
         _release(self.rings.copy(), np.zeros(0), np.inf, True, queue, np.zeros(len(self)))
         return queue
@@ -150,7 +151,7 @@ class Rings:
 
 
 def empty_queue(count: int) -> EventQueue:
-    """Room for so many readings."""
+    """An empty queue with room for count readings."""
     return EventQueue(
         np.zeros(count), np.zeros(count, np.int64), np.full((count, MAX_VALUES), np.nan),
         np.full((count, MAX_VALUES), np.nan), np.zeros(count), np.arange(count), np.zeros(count), np.ones(count),
@@ -174,7 +175,9 @@ def _take_back(rings: Array, since_s: float) -> int:
 def _release(
     rings: Array, settings: Array, until_s: float, raw: bool, queue: EventQueue, order: NDArray[np.float64]
 ) -> int:
-    """What is due, as far as there is room, into a queue, and its order of arrival; raw: flow as it was read."""
+    """Move due readings, as far as there is room, into a queue; write their order of arrival, and return their number.
+    raw: flow as it was read.
+    """
     r, p = pointer(rings), pointer(settings)
     count, newest_s = 0, until_s
     place = due(r, until_s)

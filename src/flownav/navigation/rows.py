@@ -1,4 +1,4 @@
-"""The rows of a tape, by name: what the filter says at an instant, what became of a component, a happening.
+"""The rows of a tape, by name: the filter's estimate at an instant, the outcome of a component, a happening.
 
 Each is a record of one row's numbers in a kernel, and of whole columns where `of` takes rows apart.
 """
@@ -61,7 +61,7 @@ class EstimateRow(NamedTuple, Generic[Value]):
 
 
 class InnovationRow(NamedTuple, Generic[Value]):
-    """What became of one component of a reading; t_s: the instant that it describes.
+    """Outcome of one component of a reading; t_s: the instant that it describes.
 
     sensor: `measurement.Sensor`; component: of its observation; innovation, its variance and test_ratio are NaN where
     nothing was tested; reason: `gating.Reason`.
@@ -85,7 +85,7 @@ class InnovationRow(NamedTuple, Generic[Value]):
 
 
 class EventRow(NamedTuple, Generic[Value]):
-    """A happening; kind: a place in `tape.EVENT_NAMES`, which says what the value is."""
+    """A happening; kind: a place in `tape.EVENT_NAMES`, which names the value's meaning."""
 
     t_s: Value
     kind: Value
@@ -107,7 +107,7 @@ store_estimate, store_innovation, store_event = map(row_store, (EstimateRow, Inn
 def innovation_row(
     work: Work, lanes: Lanes, lane: int, t_s: float, sensor: int, component: int
 ) -> InnovationRow[float]:
-    """What became of one lane's component; where nothing was tested, what a test says is NaN."""
+    """Outcome of one lane's component; where nothing was tested, the test's values are NaN."""
     reason = work[REASON * len(lanes) + lane]
     tested = reason != BEFORE_START and reason != DUPLICATE and reason != LATE
     return InnovationRow(
@@ -122,8 +122,8 @@ def innovation_row(
 # -- the estimate ------------------------------------------------------------------------------------------
 @equation
 def of_unknown_scale(work: Work, lanes: Lanes, state: int, lane: int) -> float:
-    """What a flow scale that nothing tells makes of a level position [m], from the start on, or velocity [m/s]: one
-    standard deviation.
+    """Error of a horizontal position [m], from the start on, or velocity [m/s] due to a flow scale that no sensor
+    determines: one standard deviation.
     """
     unknown: float = work[SCALE_DOUBT * len(lanes) + lane] * work[(STATE + state) * len(lanes) + lane]
     return unknown
@@ -131,7 +131,7 @@ def of_unknown_scale(work: Work, lanes: Lanes, state: int, lane: int) -> float:
 
 @equation
 def position_variance(work: Work, lanes: Lanes, axis: int, lane: int) -> float:
-    """Variance of position [m2]; level, with what a flow scale that nothing tells makes of it."""
+    """Variance of position [m2]; level, with the error of a flow scale that nothing determines."""
     unknown_m = of_unknown_scale(work, lanes, POSITION + axis, lane) if axis < 2 else 0.0
     return variance_of(work, lanes, POSITION + axis, lane) + unknown_m * unknown_m
 
@@ -159,7 +159,7 @@ def deviation_of(work: Work, lanes: Lanes, state: int, lane: int) -> float:
 
 @equation
 def body_velocity_variance(work: Work, lanes: Lanes, lane: int, north: float, east: float, down: float) -> float:
-    """e' P_vv e of one body axis e in earth NED [m2/s2], with what a flow scale that nothing tells makes of it."""
+    """e' P_vv e of one body axis e in earth NED [m2/s2], with the error of a flow scale that nothing determines."""
     axis = (north, east, down)
     unknown = north * of_unknown_scale(work, lanes, VELOCITY, lane)
     unknown += east * of_unknown_scale(work, lanes, VELOCITY + 1, lane)
@@ -192,7 +192,7 @@ extra_deviations = gathering(deviation_of, EXTRA_STATES)
 
 @equation
 def estimate_row(work: Work, lanes: Lanes, lane: int, t_s: float) -> EstimateRow[Any]:
-    """What one lane's filter says."""
+    """One lane's estimate as a row, with standard deviations and protection levels."""
     started = load_start(work, lanes, lane).started > 0.0
     rotation = rotation_of(work, lanes, lane)
     velocity = load_velocity(work, lanes, lane)

@@ -1,4 +1,5 @@
-"""What the navigator assumes of a vehicle's sensors where nothing better is known: keys, limits, defaults, reasons.
+"""Assumptions of the navigator about a vehicle's sensors where nothing better is known: keys, limits, defaults,
+reasons.
 
 The defaults are for any small VTOL with consumer sensors. None is fitted to a log.
 """

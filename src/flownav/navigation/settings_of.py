@@ -1,8 +1,9 @@
-"""From datasheets to what the navigator is told: the one way, for every job.
+"""From datasheets to the navigator's settings: the one way, for every job.
 
-What no sheet says keeps its default, and what a user states in a settings file stands above what a sheet says.
-Standard deviations that a sheet gives for units of its kind become the filter's for this one; densities are one-sided
-in sheets and two-sided in the filter, where white noise of density N lets its integral's variance grow by N^2 t/2.
+A value that no sheet states keeps its default, and what a user states in a settings file stands above what a sheet
+states. Standard deviations that a sheet gives for units of its kind become the filter's for this one; densities are
+one-sided in sheets and two-sided in the filter, where white noise of density N lets its integral's variance grow by N^2
+t/2.
 """
 
 import math
@@ -21,8 +22,8 @@ from flownav.sensors.magnetometer import MagneticField, MagnetometerSheet
 from flownav.sensors.range_sensor import RangeSensorSheet
 from flownav.sensors.sheets import AccelerometerSheet, GpsReceiverSheet, GyroSheet, InertialSheet, SensorSheets
 
-ABOVE_FLOOR_M = 0.01  # a step of the shipped lidar: a rangefinder that reads its floor says only that there is no more
-LEAST_SHARE = 0.05  # of a stated accuracy, where the sheet says what changes from fix to fix: chosen, not measured
+ABOVE_FLOOR_M = 0.01  # a step of the shipped lidar: a rangefinder that reads its floor shows only that there is no more
+LEAST_SHARE = 0.05  # of a stated accuracy, where the sheet states the change from fix to fix: chosen, not measured
 BIAS_LIMIT_SIGMAS = 3.0  # a limit leaves room for all but 3 in 1000 units; chosen
 VIBRATION_MARGIN = 2.0  # chosen, not measured: what is beyond twice the stated vibration, the sheet does not know
 # slower motion is held by what aids the IMU: level velocity errs by 1.17 of what is stated with 2, by 1.02 with 4
@@ -36,7 +37,7 @@ INTEGRATED_M_RT_S = 0.002
 # by more than a share that lasts does. With all of it z errs by 0.80 of what is stated (`takeoff`), with half by 0.87
 SCALE_SHARE = 0.5
 FOLLOWED_TO = 0.002  # a notch follows its tone within this (test_notch), whatever the rotor does
-LAGS_AS_STATED = 2.0  # of a receiver's filter: 0.2 to 0.3 s were found in two logs where sheets say 0.1 s (validate)
+LAGS_AS_STATED = 2.0  # of a receiver's filter: 0.2 to 0.3 s were found in two logs where sheets state 0.1 s (validate)
 WASH_LASTS_S = 3.0  # chosen, not measured: how long a rotor's wash deceives a barometer
 CLIMB_M_S = 1.0  # chosen: a lag errs by its length in a descent at this speed
 
@@ -51,7 +52,7 @@ class Told(NamedTuple):
 
     @property
     def lag_states(self) -> bool:
-        """Whether the flow sensor's dynamics are states of the filter: by its file, or as the user says."""
+        """Whether the flow sensor's dynamics are states of the filter: by its file, or as the user states."""
         return self.settings.flow_lag_c_1_s2 > 0.0
 
 
@@ -63,7 +64,7 @@ def settings_of(
     flow_noise_stated: bool = False,
     rotor_hz: tuple[float, float] | None = None,
 ) -> Told:
-    """What a navigator is told of these sensors.
+    """The navigator's settings for these sensors.
 
     flow: the flow sensor's file, else the sheets'. stated: a user's own settings; the keys that stand in it are kept.
     flow_noise_stated: the flow's noise is the file's law of the height, not that of the reading's quality.
@@ -307,8 +308,8 @@ def of_range_sensor(sheet: RangeSensorSheet) -> Keys:
 def of_barometer(sheet: BarometerSheet) -> Keys:
     """Noise, and drift as the walk that it is over short times.
 
-    A rotor's wash is an error of the default's size that lasts while the vehicle manoeuvres: as white noise of so many
-    readings a second it weighs sqrt(2 tau rate) times as much.
+    A rotor's wash is an error of the default's size that lasts while the vehicle manoeuvres: as white noise at the
+    sheet's rate it weighs sqrt(2 tau rate) times as much.
     """
     drift = sheet.drift_sigma_m * math.sqrt(2.0 / sheet.drift_tau_s) if sheet.drift_tau_s > 0.0 else 0.0
     calm = math.hypot(sheet.sigma_m, sheet.resolution_m / math.sqrt(12.0), CLIMB_M_S * sheet.lag_s)

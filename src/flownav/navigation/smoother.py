@@ -60,14 +60,14 @@ class Mark(NamedTuple):
 
 
 class Backward(NamedTuple):
-    """lambda (STATES,) and Lambda (STATES, STATES): what later readings say of the error state."""
+    """lambda (STATES,) and Lambda (STATES, STATES): the information of later readings on the error state."""
 
     vector: Array
     matrix: Array
 
 
 def smooth(queue: EventQueue, running: Running, chunk: int = EVENTS_AT_ONCE) -> Array:
-    """Run a navigator that has heard nothing through a queue; its estimates smoothed, (n, ESTIMATE_COLUMNS).
+    """Run a new navigator through a queue; its estimates smoothed, (n, ESTIMATE_COLUMNS).
 
     The rows are those of the tape's estimate, at the same instants. No state is merely considered in this run: what
     goes back over a correction is that of the gain P h'/S. The tape is left as such a run leaves it.

@@ -32,8 +32,8 @@ USUAL_JUMP_READINGS = 50.0  # over which that is followed: chosen; half and twic
 BURST_SLOWNESS = 3.0  # times, in a burst: it must not make itself usual; chosen, 1.5 and 6 pass test_spikes too
 LONGEST_S = 0.1  # chosen, not measured: readings further apart are no neighbours
 AFTER_GAP_S = 0.02  # chosen: a jump over a gap is held to what 50 Hz allow, since the reading stands for all of it
-MOST_REFUSED = 3.0  # in a row, after a gap, or of one that shakes and says nothing again (test_spikes)
-# usual jumps of one that does not shake, where a burst is told from what happens: 0.05 to 0.08 and 0.5 to 0.6 in the
+MOST_REFUSED = 3.0  # in a row, after a gap, or of one that shakes and repeats no reading (test_spikes)
+# usual jumps of one that does not shake, where a burst differs from motion: 0.05 to 0.08 and 0.5 to 0.6 in the
 # outdoor logs; mocap and indoor-made shake (0.07 to 0.1 and 1.5 to 1.9), d-vibration most (0.3 and 7.6)
 CALM_RAD_S, CALM_M_S2 = 0.3, 1.5
 BURST_S = 0.3  # spikes that last longer are what happened: chosen, the longest burst of test_live_glitches
@@ -64,10 +64,10 @@ def is_dead(r: Reading) -> bool:
 def judge_spike(reading: Reading, step_s: float, m: ImuMemory, s: SpikeMemory) -> tuple[bool, SpikeMemory]:
     """Whether an inertial reading is a spike after the one that was kept, step_s before; and the memory of it.
 
-    Only in a vehicle that does not shake is a burst told from what happens to it; in one that does, what the next
-    reading says again is believed, and three in a row are the most. In a burst a reading is held against what was kept
-    before it, by the jump that was possible when it began. After a gap beyond BURST_S three in a row are the most. The
-    usual jump is that between neighbours, kept or not: motors that start shake every reading, a burst stands still.
+    Only in a vehicle that does not shake is a burst distinguished from real motion; in one that does, a value that the
+    next reading repeats is believed, and three in a row are the most. In a burst a reading is held against what was
+    kept before it, by the jump that was possible when it began. After a gap beyond BURST_S three in a row are the most.
+    The usual jump is that between neighbours, kept or not: motors that start shake every reading, a burst stands still.
     """
     gyro = distance(reading.value_0 - m.gyro_x, reading.value_1 - m.gyro_y, reading.value_2 - m.gyro_z)
     accel = distance(reading.value_3 - m.accel_x, reading.value_4 - m.accel_y, reading.value_5 - m.accel_z)
@@ -109,7 +109,7 @@ def doubt_of(reading: Reading, step_s: float, m: ImuMemory, s: SpikeMemory) -> f
 
 @equation
 def turning_doubt_of(reading: Reading, step_s: float, m: ImuMemory, s: SpikeMemory) -> float:
-    """Variance that a hit adds to the attitude [rad2], of what the gyro says."""
+    """Variance that a hit adds to the attitude [rad2], by the gyro's reading."""
     gyro = distance(reading.value_0 - m.gyro_x, reading.value_1 - m.gyro_y, reading.value_2 - m.gyro_z)
     return grown(gyro, step_s, MOST_DOUBT_RAD, s)
 
@@ -129,7 +129,7 @@ class Arrived(NamedTuple):
 
 
 class SpikeVerdict(NamedTuple):
-    """What becomes of an inertial reading that may be a spike."""
+    """Verdict on an inertial reading that may be a spike: memory, whether it is taken, doubts, and event."""
 
     spike: SpikeMemory
     arrived: Arrived

@@ -36,7 +36,7 @@ READ_HEADING_RAD = 0.1  # an autopilot's, whose compass is calibrated: outdoor's
 UNKNOWN_RAD = 1.5  # one that is to be found from the course: any of half a turn
 COMPASS_HEADING_RAD = 0.3  # a raw magnetometer's: twice the usual hard iron (compass_sigma_rad)
 DATUM_HEADING_RAD = 1e-3  # the start defines the frame
-UNTOLD_HEADING_RAD = 1.0  # the first heading that is told will, 0.5 rad off (test_an_external_heading_is_taken)
+UNTOLD_HEADING_RAD = 1.0  # the first external heading ends it, 0.5 rad off (test_an_external_heading_is_taken)
 LEAST_LEVELLING = 5.0  # readings whose mean is level: 0.1 s at 50 Hz
 # so sure a mean will do (0.6 deg); a shaken vehicle's is waited for
 LEVELLED_M_S2, LEVELLING_S = 0.1, 1.0
@@ -106,7 +106,7 @@ def any_starts(reading: Reading, m: StartMemory, *, t_s: float, sensor: int, dea
 
 
 class Levelling(NamedTuple):
-    """What the mean specific force says: how far it is believed, the accelerometer's bias forward and to the right
+    """The level by the mean specific force: how far it is believed, the accelerometer's bias forward and to the right
     [m/s2], the variances of tilt, of that bias and of the vertical one, and of tilt and bias together [rad m/s2].
     """
 
@@ -120,9 +120,9 @@ class Levelling(NamedTuple):
 
 
 class FirstState(NamedTuple):
-    """What a lane starts with beside its settings' standard deviations: its place [m], attitude, accelerometer's bias,
-    their variances, whether nothing tells it the flow's scale, and the force that it feels. starts: false where it
-    does not.
+    """First state of a lane, beyond its settings' standard deviations: its place [m], attitude, accelerometer's bias,
+    their variances, whether nothing determines the flow's scale, and the force that it feels. starts: false where it
+    does not start.
     """
 
     starts: bool
@@ -162,7 +162,7 @@ def begin(work: Work, lanes: Lanes, lane: int, first: FirstState, p: Work) -> No
 
 @equation
 def tie_tilt(work: Work, lanes: Lanes, lane: int, rotation: Rotation, shared: float) -> None:
-    """What is wrong of tilt and bias together: a force that was taken for a tilt is no bias.
+    """Set the covariance of tilt and accelerometer bias: a force that was taken for a tilt is no bias.
 
     By the law of motion dv' = theta x (R f) - R db, whose left side is 0 for a levelled vehicle and R f is -g.
     """
@@ -199,7 +199,9 @@ def levelling(m: StartMemory, bias_sigma: float, rectified: float, read: bool, u
 
 @equation
 def heading_sigma(read: bool, lost: bool, unknown: bool, field_rad: float, heading: float) -> float:
-    """How unsure the first heading is [rad]. lost: the start does not define the frame; unknown: no sensor tells it."""
+    """How unsure the first heading is [rad]. lost: the start does not define the frame; unknown: no sensor determines
+    it.
+    """
     known = heading == NO_HEADING and not lost
     turned = DATUM_HEADING_RAD if known else (READ_HEADING_RAD if read else COMPASS_HEADING_RAD)
     turned = UNKNOWN_RAD if unknown else turned
@@ -208,7 +210,7 @@ def heading_sigma(read: bool, lost: bool, unknown: bool, field_rad: float, headi
 
 
 class Beginning(NamedTuple):
-    """What becomes of a lane that starts."""
+    """Result of a lane's start: its first state, memories and event."""
 
     first: FirstState
     start: StartMemory
@@ -272,7 +274,7 @@ def try_start(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipme
 @equation
 def level(m: StartMemory, believed: float, field_rad: float, fitted: Equipment) -> Quaternion:
     """Roll and pitch from the mean specific force as far as it is believed (1: wholly); heading from the magnetometer
-    or what is told as one where that was heard, else north.
+    or an external heading where one was received, else north.
 
     The field was noted in the axes of a vehicle that takes itself to be level and to head north.
     """

@@ -1,11 +1,12 @@
-"""A vehicle that stands: found from what its IMU, range, flow and GPS read over a window, and what standing teaches.
+"""A vehicle that stands: detected from the readings of its IMU, range, flow and GPS over a window, and the biases
+learnt while it stands.
 
 With its motors off an IMU is quieter than in any flight, and its gyro then reads nothing but its bias. With them
 running it is not, but a vehicle whose range reads what it reads on the ground, and does not change, while the flow
 shows no motion, has no velocity worth the name; nor does it turn much over the whole of the stand, so that the mean of
 its gyro is the bias to within SLIP_RAD or SETTLE_RAD over its length, and what its shaking leaves in a mean. Nothing is
-taught above the height of contact. Where a range says nothing any more, as some do on the ground, what it said last
-tells whether the ground is there.
+taught above the height of contact. Where a range gives no data any more, as some do on the ground, its last value
+decides whether the ground is there.
 """
 
 from typing import NamedTuple
@@ -43,7 +44,7 @@ WINDOW_S = 0.5  # chosen: what stands for 2 s is known within 2 s (test_hard_fli
 # A stand is held to be one so often: an accelerometer that rotors make read 3 m/s2 too much as they spin up is 0.8 m/s
 # of velocity, and 0.2 m, in a window
 HOLD_S = 0.1
-SLACK_S = 1e-6  # of instants that are told in microseconds
+SLACK_S = 1e-6  # of instants that are stated in microseconds
 # On the ground ranges read 0.02 (indoor-made), 0.05 (voxl) and 0.13 (outdoor); a hover at 0.3 m
 # must teach no gyro (test_hard_flights).
 NEAR_M = 0.15
@@ -58,7 +59,7 @@ BELIEVED_SIGMAS = 2.0  # a bias that rest contradicts by more is opened: chosen,
 
 # -- the end of a window, and on the way ---------------------------------------------------------------------
 class Stand(NamedTuple):
-    """What a vehicle does; whether it stands, in any lane."""
+    """State of motion of a vehicle with its event; any: whether it stands, in any lane."""
 
     stand: StandMemory
     event: Event
@@ -67,7 +68,7 @@ class Stand(NamedTuple):
 
 @on_lanes
 def judge_stand(start: StartMemory, gyro: ImuWindow, seen: SeenWindow, m: StandMemory) -> Stand:
-    """What the vehicle did in the window, and the range where it rests."""
+    """State of motion in the window, and the range where the vehicle rests."""
     does = judge_standing(gyro, seen, m.contact_m, m.last_m)
     lower = (
         does == SHAKEN
@@ -99,7 +100,7 @@ def touches(m: StandMemory, seen: SeenWindow) -> bool:
 
 @equation
 def contradicted(m: StandMemory, seen: SeenWindow) -> bool:
-    """Whether what was read since the last window says that a vehicle which stood then does no longer."""
+    """Whether the readings since the last window show that a vehicle which stood then does no longer."""
     ranged = seen.range_high_m >= 0.0
     return (
         ranged and (seen.range_high_m > contact_range(m.contact_m) or not is_steady(seen))
@@ -108,12 +109,12 @@ def contradicted(m: StandMemory, seen: SeenWindow) -> bool:
 
 @equation
 def is_down(m: StandMemory, seen: SeenWindow) -> bool:
-    """Whether the ground is as near as it was when the vehicle stood on it, as far as ranges tell since the window."""
+    """Whether the ground is as near as it was when the vehicle stood on it, as far as ranges since the window show."""
     return seen.range_high_m >= 0.0 and seen.range_high_m <= m.contact_m + STEADY_RANGE_M
 
 
 class Rest(NamedTuple):
-    """A velocity of 0, what is doubted before it is offered, and whether the accelerometer is."""
+    """A velocity of 0, the doubts before it is offered, and whether the accelerometer is doubted."""
 
     velocity: Doubt
     accel: tuple[Doubt, Doubt, Doubt]
@@ -126,9 +127,9 @@ def offer_rest(
     start: StartMemory, seen: SeenWindow, m: StandMemory, velocity: AxisVelocity, imu: ImuMemory, *, axis: int,
     s: PlaceSettings,
 ) -> Rest:  # fmt: skip
-    """No velocity along an axis, for the next HOLD_S of a stand, and little of one that slides on the ground. One that
-    the gate would not let go of a vehicle that touches the ground is what is wrong, and so is the accelerometer that
-    made it.
+    """No velocity along an axis, for the next HOLD_S of a stand, and little of one that slides on the ground. A
+    velocity that the gate would not allow of a vehicle that touches the ground is wrong, and so is the accelerometer
+    that made it.
     """
     touching = touches(m, seen)
     level = axis < 2 and touching  # a range that is stuck in descent looks like standing
@@ -152,11 +153,12 @@ def offer_rest(
 
 @equation
 def stand_turning(windows: float, axis: int) -> float:
-    """The variance of a window's mean turning about its gyro's bias [(rad/s)^2], of a vehicle that has stood for so
-    many windows with its motors on: what it turns over the whole stand is bounded, not what it turns in each window.
+    """The variance of a window's mean turning about its gyro's bias [(rad/s)^2], of a vehicle that has stood for that
+    number of windows with its motors on: what it turns over the whole stand is bounded, not what it turns in each
+    window.
 
-    A stand of n windows tells the rate to within the bound over its time T = n WINDOW_S, which is an information of
-    T^2 / bound^2; a window's is what T^2 grew by.
+    A stand of n windows determines the rate to within the bound over its time T = n WINDOW_S, which is an information
+    of T^2 / bound^2; a window's is what T^2 grew by.
     """
     bound = SLIP_RAD if axis == 2 else SETTLE_RAD
     rate = bound / WINDOW_S
@@ -199,7 +201,9 @@ def stands_still(start: StartMemory, seen: SeenWindow, m: StandMemory) -> Anywhe
 
 @procedure
 def stand_still(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) -> None:
-    """At the end of a window: what the vehicle does, and what that teaches; on the way a stand is held to be one."""
+    """At the end of a window, judge the state of motion and learn from it; within the window a stand is held to be
+    one.
+    """
     ended = hold_stand(work, lanes, t_s, p, o)
     if ended > 0.0:
         close_window(work, lanes, ended, t_s, p, o)
@@ -231,7 +235,7 @@ def hold_stand(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) -> floa
 
 @procedure
 def close_window(work: Work, lanes: Lanes, ended: float, t_s: float, p: Work, o: Output) -> None:
-    """What a window that has ended teaches; the next begins."""
+    """Learn from a window that has ended; the next begins."""
     s = load_place_settings(p)
     if ended == ENDED_STANDING:
         learn_bias(work, lanes, s.gate_sigma, o)

@@ -1,4 +1,4 @@
-"""Which fault is suspected, and what is remembered of those that are sought anew.
+"""Which fault is suspected, and the memory of those that are sought anew.
 
 Faults that are there or are not are sought until innovations exclude them; those that last, in windows.
 """
@@ -40,11 +40,11 @@ from flownav.navigation.memory import (
 from flownav.navigation.records import SuspicionMemory
 from flownav.navigation.tape import FAULT_CLEARED, FAULT_SUSPECTED, Output, write_event
 
-MEMORY_S = 20.0  # of what was told of faults
+MEMORY_S = 20.0  # over which the innovations' evidence of faults fades
 EXCLUDED_SIGMAS = 8.0  # from a fault that is there or is not; never excluded, its effect has no bound (test_protection)
 PUZZLING_EVIDENCE = 9.0  # 3 sigma, for a fault that is there or is not, after which it may be there for long
 WINDOW_S = 20.0  # a fault that lasts is sought from the start of such a window
-# evidence that says so (4.9 sigma), and that says so no more (2.2); at 0 none is cleared (test_protection_by_hand)
+# evidence that raises a suspicion (4.9 sigma), and that ends it (2.2); at 0 none is cleared (test_protection_by_hand)
 SUSPECT_EVIDENCE, CLEAR_EVIDENCE = 24.0, 5.0
 HELD_S = 10.0  # so long a suspicion lasts at least: what the fault did is still there; chosen, not measured
 with_left_over = replacing(SuspicionMemory, "left_over_m")
@@ -52,14 +52,16 @@ with_left_over = replacing(SuspicionMemory, "left_over_m")
 
 @equation
 def leave_over(work: Work, lanes: Lanes, lane: int, moved_m: float) -> None:
-    """What a fault may have done to the position, before it is sought anew: one fault at a time, so the most of all."""
+    """Keep the largest effect that a fault may have had on the position, before it is sought anew; faults come one at a
+    time.
+    """
     m = load_suspicion(work, lanes, lane)
     store_suspicion(work, lanes, lane, with_left_over(m, left_over_m=larger(m.left_over_m, moved_m)))
 
 
 @equation
 def seek_anew(work: Work, lanes: Lanes, fault: int, lane: int, drifted_s: float) -> None:
-    """A fault that lasts is sought from now on; what it did until now, by its size, stays where it is.
+    """A fault that lasts is sought from now on; its effect until now, by its size, stays.
 
     Of a drift of GPS, its reading stays off by what it drifted since the search began.
     """
@@ -74,7 +76,7 @@ def seek_anew(work: Work, lanes: Lanes, fault: int, lane: int, drifted_s: float)
 
 @procedure
 def seek_windows_anew(work: Work, lanes: Lanes, t_s: float) -> None:
-    """Faults that last are sought in windows: drifts of GPS, and what is wrong with the IMU."""
+    """Faults that last are sought in windows: drifts of GPS, and errors of the IMU."""
     since_s = shared(work, lanes, DRIFT_SINCE)
     if t_s - since_s > WINDOW_S:
         share(work, lanes, DRIFT_SINCE, t_s)
@@ -100,7 +102,9 @@ def exclude(work: Work, lanes: Lanes, lane: int, fault: int) -> None:
 def judge_suspicion(
     m: SuspicionMemory, worst: float, which: int, puzzled: bool, travel_m: float, kept: float, t_s: float
 ) -> SuspicionMemory:
-    """What is suspected, by the evidence of the worst fault; what was left over fades, and grows while flow puzzles."""
+    """Memory of suspicion after the evidence of the worst fault; what was left over fades, and grows while flow
+    puzzles.
+    """
     suspects = m.suspected == 0.0 and worst > SUSPECT_EVIDENCE
     clears = m.suspected > 0.0 and worst < CLEAR_EVIDENCE and t_s - m.suspected_s > HELD_S
     puzzled_s = t_s if puzzled else m.puzzled_s
@@ -115,7 +119,7 @@ def judge_suspicion(
 
 @procedure
 def mind_faults(work: Work, lanes: Lanes, t_s: float, dt_s: float, o: Output) -> None:
-    """Say which fault is suspected, and when none is any more; what was told of them fades."""
+    """Write which fault is suspected, and when none is any more; the evidence of faults fades."""
     if followed(work, lanes) == 0:
         return
     kept = exp(-dt_s / MEMORY_S)

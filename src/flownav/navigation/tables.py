@@ -1,4 +1,4 @@
-"""What a navigator was fed and what it wrote, as the tables of a record: the same for replay, live and simulation."""
+"""Tables of a record: a navigator's readings and its output, the same for replay, live and simulation."""
 
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ Happening = tuple[float, str, str, str, float]  # time [s], source, kind, what t
 
 
 class Written(NamedTuple):
-    """What one lane's navigator wrote: rows of a tape's estimate, innovation and event (`navigation.rows`)."""
+    """Output of one lane's navigator: rows of a tape's estimate, innovation and event (`navigation.rows`)."""
 
     estimate: Array
     innovation: Array
@@ -93,7 +93,7 @@ def innovation_table(rows: Array) -> Table:
 
 
 def _component_names() -> Array:
-    """What each component of a sensor observes, by sensor number and component."""
+    """Names of the quantities that a sensor observes, by sensor number and component."""
     names = np.full((max(Sensor) + 1, 3), "", dtype="U16")
     for sensor, observed in OBSERVES.items():
         names[sensor, : len(observed)] = observed

@@ -83,7 +83,7 @@ def navigate(work: Work, lanes: Lanes, p: Work, o: Output, t_s: float, sensor: i
 # -- a reading's way, part by part: on board each may be done at another time (`onboard`) ------------------------
 @equation
 def receive(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p: Work, o: Output) -> None:
-    """What a reading says of the time before it: whether it is a spike, and what moves the filter up to its instant."""
+    """Process a reading for the time before it: drop it if it is a spike, and find the motion up to its instant."""
     heard = sensor == Sensor.IMU and fitted.use_imu
     gather(work, lanes, t_s, sensor)
     if runs(work, lanes):
@@ -113,7 +113,7 @@ def arrive(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment,
 
 @equation
 def leave(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
-    """What follows once a reading is taken: a vehicle may stand; `go_on`."""
+    """Finish after a reading is taken: test whether the vehicle stands; then `go_on`."""
     if sensor == Sensor.IMU:
         stand_still(work, lanes, t_s, p, o)
     go_on(work, lanes, t_s, p, o)
@@ -138,7 +138,7 @@ def go_on(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) -> None:
 
 @equation
 def watch_others(work: Work, lanes: Lanes, sensor: int) -> None:
-    """What ranges and GPS say to one who asks whether the vehicle stands."""
+    """Note ranges and GPS velocities for the test of whether the vehicle stands."""
     if sensor == Sensor.RANGE:
         watch_range(work, lanes)
     elif sensor == Sensor.GPS_VELOCITY:
@@ -147,8 +147,8 @@ def watch_others(work: Work, lanes: Lanes, sensor: int) -> None:
 
 @equation
 def consider_datum(work: Work, lanes: Lanes, fitted: Equipment) -> None:
-    """A heading that nothing refers to the earth is a datum: only the gyro moves it, and only rest tells its bias. One
-    that is yet to be found from the course is one until then, and by it GPS would turn every push into tilt.
+    """A heading that nothing refers to the earth is a datum: only the gyro moves it, and only rest determines its bias.
+    One that is yet to be found from the course is one until then, and by it GPS would turn every push into tilt.
     """
     datum = fitted.heading == NO_HEADING and not np.isfinite(fitted.deadline_s)
     if not fitted.use_attitude and (datum or seeks(work, lanes)):
@@ -289,7 +289,7 @@ navigate_lanes_with_lag = unit(take_one, UNIT_SIGNATURE, lanes=with_lag(LANES))
 
 
 def navigator_unit(lanes: Lanes, lag: bool) -> Unit:
-    """The unit of so many lanes; lag: with the flow sensor's dynamics as states. It is compiled when it is run."""
+    """The unit for these lanes; lag: with the flow sensor's dynamics as states. It is compiled when it is run."""
     if lag:
         return navigate_one_with_lag if len(lanes) == 1 else navigate_lanes_with_lag
     return navigate_one if len(lanes) == 1 else navigate_lanes

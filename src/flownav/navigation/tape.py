@@ -1,8 +1,8 @@
-"""What a navigator writes as it runs: estimates, what became of each component, happenings, and a smoother's journal.
+"""A navigator's output as it runs: estimates, the outcome of each component, happenings, and a smoother's journal.
 
 A `Tape` holds them for every lane, and `Output` is what kernels take of it: pointers. Estimates and components are
-written at the same instants in all lanes (their schedule is the same); a lane that has nothing to say there has NaN
-for its time, or the reason SILENT. Happenings come when they come, lane by lane. A tape without rows only counts.
+written at the same instants in all lanes (their schedule is the same); a lane without a row there has NaN for its time,
+or the reason SILENT. Happenings come when they come, lane by lane. A tape without rows only counts.
 """
 
 from collections.abc import Mapping
@@ -65,9 +65,9 @@ EVENT_NAMES = (
     ("flow", "doubted", "it contradicts IMU and GPS: mean square innovation over its variance"),
     ("flow", "trusted", "it agrees again: mean square innovation over its variance"),
     ("filter", "standing", "the vehicle moves (0), stands with its motors running (1), or rests (2)"),
-    ("imu", "spike", "a reading that no vehicle can follow was dropped: it said this turning [rad/s]"),
+    ("imu", "spike", "a reading that no vehicle can follow was dropped: it read this turning [rad/s]"),
     ("heading", "found", "from the course by GPS and flow: it was off by this much [rad]"),
-    ("filter", "suspects", f"a fault that innovations tell of: {', '.join(f'{i} {n}' for i, n in enumerate(FAULTS))}"),
+    ("filter", "suspects", f"a fault that innovations show: {', '.join(f'{i} {n}' for i, n in enumerate(FAULTS))}"),
     ("filter", "cleared", "that fault is no more suspected"),
     ("heading", "refuted", "flow and accelerometer contradict what is read as heading: it was off by this much [rad]"),
 )
@@ -76,7 +76,7 @@ ESTIMATES, OFFERED_ROWS, ENTRIES, NOTES, FIRST_EVENTS = 0, 1, 2, 3, 4
 
 
 class Journal(NamedTuple):
-    """What a smoother needs: entry (n, ENTRY), state and quaternion (m, STATES + 4), covariance (m, STATES, STATES)."""
+    """A smoother's journal: entry (n, ENTRY), state and quaternion (m, STATES + 4), covariance (m, STATES, STATES)."""
 
     entry: Array
     state: Array
@@ -102,7 +102,7 @@ class Tape(NamedTuple):
         return np.ascontiguousarray(rows[np.isfinite(EstimateRow.of(rows).t_s)])
 
     def offers(self, lane: int = 0) -> Array:
-        """What became of each component in one lane, (m, INNOVATION_COLUMNS)."""
+        """Outcomes of each component in one lane, (m, INNOVATION_COLUMNS)."""
         rows = self.innovation[: self.used[OFFERED_ROWS], :, lane]
         return np.ascontiguousarray(rows[InnovationRow.of(rows).reason != SILENT])
 
@@ -144,7 +144,7 @@ def new_tape(queue: EventQueue) -> Tape:
 
 
 def tape_for(readings: Mapping[Sensor, int], lasts_s: float) -> Tape:
-    """A tape long enough for so many readings of each sensor in this time."""
+    """A tape long enough for the stated number of readings of each sensor in this time."""
     components = sum(count * readings.get(sensor, 0) for sensor, count in COMPONENTS.items())
     events = sum(readings.values())
     estimates = min(events, int(lasts_s / ESTIMATE_PERIOD_S) + 2)
@@ -180,7 +180,9 @@ def write_event(lanes: Lanes, lane: int, t_s: float, kind: np.int_ | int, value:
 
 @procedure
 def write_offer(work: Work, lanes: Lanes, t_s: float, sensor: int, component: int, o: Output) -> None:
-    """What became of the component that was offered last, by its REASON in each lane; no row where all are silent."""
+    """Write the outcome of the component that was offered last, by its REASON in each lane; no row where all are
+    silent.
+    """
     row = o.used[OFFERED_ROWS]
     if row >= o.room[1]:
         return

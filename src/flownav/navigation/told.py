@@ -1,4 +1,4 @@
-"""What a navigator is told, subject by subject, as its kernels take it: named tuples of numbers.
+"""A navigator's settings, subject by subject, as its kernels take them: named tuples of numbers.
 
 `settings.NavigatorSettingsFile` documents each key and makes these of a file.
 """
@@ -8,7 +8,7 @@ from typing import NamedTuple
 from flownav.core.compile import equation
 from flownav.estimation.error_models import FilterSettings
 
-# headings: none, a magnetometer's, an external attitude's, what is told as one
+# headings: none, a magnetometer's, an external attitude's, an external heading
 NO_HEADING, FROM_MAG, FROM_ATTITUDE, FROM_YAW = 0.0, 1.0, 2.0, 3.0
 
 
@@ -170,7 +170,7 @@ class ImuSettings(NamedTuple):
 
 
 class AidSettings(NamedTuple):
-    """When the position is said to be dead reckoning, and invalid."""
+    """Times without aid after which the position is marked as dead reckoning, and as invalid."""
 
     dead_reckoning_s: float
     invalid_s: float
@@ -192,7 +192,7 @@ class Equipment(NamedTuple):
 
 
 class NavigatorSettings(NamedTuple):
-    """Everything a navigator is told."""
+    """All settings of a navigator."""
 
     filter: FilterSettings
     imu: ImuSettings

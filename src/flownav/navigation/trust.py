@@ -1,7 +1,7 @@
-"""How far the accelerometer is trusted: as far as what the flow and the range say after it is white.
+"""Trust in the accelerometer, as far as the innovations of flow and range are white.
 
 Innovations of a filter whose model holds are white (Kailath, An Innovations Approach to Least-Squares Estimation, 1968;
-Mehra, On the Identification of Variances and Adaptive Kalman Filtering, 1970). A sensor noisier than told makes them
+Mehra, On the Identification of Variances and Adaptive Kalman Filtering, 1970). A sensor noisier than stated makes them
 larger, not alike; motion that errs, as by an accelerometer that vibration rectifies, makes neighbours alike. So their
 likeness over blocks of time, and not their size, moves the accelerometer's noise, up and down again.
 """
@@ -20,7 +20,7 @@ from flownav.navigation.verdicts import Noise, Tested, on_lanes
 # white innovations of any size hardly raise the factor (test_trust: 1.26 in the mean square, 1.57 with the block before
 # alone). Each but the largest, halved or doubled, fails test_trust, but for a pace half and a likeness twice as large.
 BLOCK_S = 0.1
-LONGEST_BLOCK_S = 1.0  # readings further apart say nothing of each other
+LONGEST_BLOCK_S = 1.0  # readings further apart are independent
 FOLLOWING_BLOCKS = 10.0
 BLOCKS_BEFORE = 3.0  # what a block is held against, exponentially
 LIKENESS_ALLOWED = 0.15
@@ -28,12 +28,12 @@ FACTOR_PACE = 0.25  # by how much the factor grows or shrinks in a block, per li
 LEAST_FACTOR = 0.7  # chosen: with 1 white innovations held it a tenth above 1 on average (landing-filter.md)
 LARGEST_FACTOR = 30.0  # 1 carries that position half a kilometre off
 NOISE_TIME_S = 20.0  # chosen: a noise is found within 15 % (test_trust)
-FIRST_READINGS = 25.0  # the first few are followed sooner, as if so many had said what is told: chosen
-SMALLEST_NOISE, LARGEST_NOISE = 0.02, 25.0  # of the variance that is said: chosen; the first is held by test_trust
+FIRST_READINGS = 25.0  # the first few are followed sooner, as if this many had confirmed the stated noise: chosen
+SMALLEST_NOISE, LARGEST_NOISE = 0.02, 25.0  # of the stated variance: chosen; the first is held by test_trust
 SMALLEST_OF_BARO = 0.1  # wash and gusts last: chosen, not measured
 # places of components whose noise is followed; GPS position and velocity have three
 OF_RANGE, OF_BARO, OF_GPS = 0, 1, 2
-STRAY_SHARE = 0.02  # among so many strays ranges say nothing of the accelerometer: `offers.FEW_STRAYS` (test_trust)
+STRAY_SHARE = 0.02  # with more strays ranges are no evidence on the accelerometer: `offers.FEW_STRAYS` (test_trust)
 # Innovations lean to one side before a range creeps out of its gate: where they are white, their exponential mean has a
 # standard deviation of 0.58 and lies beyond CREPT_SIGMAS once in a hundred. The second refused is within JUMPED gates,
 # not the first: a sonar over grass (outdoor-3) leaves its gate for one reading.
@@ -87,7 +87,7 @@ def watch_whiteness(
 
 
 class AccelFactors(NamedTuple):
-    """How many times the accelerometer's noise is what it was said to be: level, in the worse axis, and down."""
+    """Factors on the accelerometer's stated noise: level, in the worse axis, and down."""
 
     level: float
     down: float

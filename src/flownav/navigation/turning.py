@@ -43,8 +43,8 @@ def next_reading(r: Work, p: Work, place: int) -> Arrival:
 def with_turning(r: Work, p: Work, a: Arrival) -> Arrival:
     """A flow reading with the mean rates over its exposure beside its own gyro's, or in their place where it has none.
 
-    They are those of the inertial readings; else of the attitude that is told, which stands in the sensor's place only.
-    Where the sensor's own gyro was taken for dead it is listened to all the same (`beside`).
+    They are those of the inertial readings; else of the external attitude, which stands in the sensor's place only.
+    Where the sensor's own gyro was taken for dead its readings are followed all the same (`beside`).
     """
     s, q = load_sizes(r, ONE_LANE, 0), load_queue(r, ONE_LANE, 0)
     begin_s = a.end_s - a.exposure_s
@@ -70,11 +70,11 @@ def with_turning(r: Work, p: Work, a: Arrival) -> Arrival:
 
 @equation
 def beside(m: OwnGyro, x: float, y: float, turning: Rates) -> tuple[OwnGyro, Rates]:
-    """What is known of a sensor's own gyro after it said x and y, and the turning: its own less its bias, or that by
-    the inertial unit while it has said nothing but the same.
+    """The memory of a sensor's own gyro after it read x and y, and the turning: its own less its bias, or that by the
+    inertial unit while it has only repeated one value.
 
     It looks when the flow looks, so that it serves better than the mean of an inertial unit over a guessed exposure. It
-    was taken for dead because the vehicle stood still while it was listened to.
+    was taken for dead because the vehicle stood still while it was tested.
     """
     if not (np.isfinite(x) and np.isfinite(y)):
         return m, turning

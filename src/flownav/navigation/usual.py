@@ -1,8 +1,9 @@
-"""What a vehicle usually does, for one that no sensor tells: who takes off vertically flies level, more or less.
+"""The usual attitude of a vehicle, for one whose tilt no sensor determines: who takes off vertically flies level, more
+or less.
 
-It is a witness that is heard only where nothing better is: a filter that knows its tilt keeps every bit. A gyro that
-reads its vibration at its aliases, beside an accelerometer that does, tells no tilt, and beyond its limit no range or
-flow would be heard again.
+It is a witness that is used only where there is no better one: a filter that knows its tilt keeps every bit. A gyro
+that reads its vibration at its aliases, beside an accelerometer that does, determines no tilt, and beyond its limit no
+range or flow would be used again.
 """
 
 from flownav.core.compile import Lanes, Work, equation, procedure, squared
@@ -37,7 +38,7 @@ def offer_level(start: StartMemory, variance: AttitudeVariance) -> Offer:
 
 @procedure
 def assume_usual(work: Work, lanes: Lanes, gate_sigma: float, o: Output) -> None:
-    """What is usual, in the lanes where nothing tells better."""
+    """Offer a level attitude, in the lanes where nothing better determines the tilt."""
     if is_tilt_lost(work, lanes):
         for axis in range(2):
             offer_level(work, lanes)

@@ -1,8 +1,9 @@
-"""What a judge returns beside its memory, and what takes it: an offer to the filter, an event, a state reset, a doubt.
+"""Parts of a judge's verdict beyond its memory, and what takes them: an offer to the filter, an event, a state reset, a
+doubt.
 
-A judge is `judge(reading, what the filter says, memory, settings) -> verdict` on one lane's records, decorated with
-`on_lanes`: the loop over lanes, the loads and the stores are generated, and each part of a verdict goes where it
-belongs. Nothing is left in rows for a later function to find.
+A judge is `judge(reading, estimates, memory, settings) -> verdict` on one lane's records, decorated with `on_lanes`:
+the loop over lanes, the loads and the stores are generated, and each part of a verdict goes where it belongs. Nothing
+is left in rows for a later function to find.
 """
 
 from typing import NamedTuple
@@ -41,7 +42,7 @@ from flownav.navigation.tape import Output, write_event
 
 # -- what a judge is given of the filter ----------------------------------------------------------------------
 class Biases(NamedTuple):
-    """What the filter says of the gyro's biases [rad/s] and the accelerometer's [m/s2], body FRD."""
+    """The filter's estimate of the gyro's biases [rad/s] and the accelerometer's [m/s2], body FRD."""
 
     gyro_x: float
     gyro_y: float
@@ -60,7 +61,9 @@ class Force(NamedTuple):
 
 
 class AppliedMotion(NamedTuple):
-    """What moves the filter over the next step: gyro [rad/s] and specific force [m/s2], body FRD, biases and all."""
+    """The motion that moves the filter over the next step: gyro [rad/s] and specific force [m/s2], body FRD, biases
+    included.
+    """
 
     gyro_x: float
     gyro_y: float
@@ -79,7 +82,7 @@ class MotionNoise(NamedTuple):
 
 
 class Height(NamedTuple):
-    """What the filter says of its height: down and its speed's standard deviation, and R_33."""
+    """The filter's height: down [m], its speed's standard deviation [m/s], and R_33."""
 
     pos_d_m: float
     speed_sigma_m_s: float
@@ -87,7 +90,7 @@ class Height(NamedTuple):
 
 
 class Tested(NamedTuple):
-    """What became of the component that was offered last: its fate (`reasons`), innovation, h P h' + R, and R."""
+    """Outcome of the component that was offered last: its fate (`reasons`), innovation, h P h' + R, and R."""
 
     reason: float
     innovation: float
@@ -96,7 +99,7 @@ class Tested(NamedTuple):
 
 
 class GroundBelow(NamedTuple):
-    """What the filter says of the ground below: the height over it [m], the variance of that [m2], and R_EB."""
+    """The filter's estimate of the ground below: the height over it [m], the variance of that [m2], and R_EB."""
 
     height_m: float
     variance: float
@@ -111,7 +114,7 @@ class AxisVelocity(NamedTuple):
 
 
 class AxisBias(NamedTuple):
-    """The gyro's bias about one body axis, as the filter says [rad/s], and its variance."""
+    """The filter's estimate of the gyro's bias about one body axis [rad/s], and its variance."""
 
     rad_s: float
     variance: float
@@ -133,7 +136,7 @@ class Offer(NamedTuple):
 
 
 class Observation(NamedTuple):
-    """What is written down as measured, where that is not what the law reads."""
+    """The value written as measured, where that is not the value that the law reads."""
 
     value: float
 
@@ -163,13 +166,13 @@ class Offered(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """What the law is held against, where that is not what was offered."""
+    """The value that the law is compared with, where that is not the offered value."""
 
     measured: float
 
 
 class GyroShare(NamedTuple):
-    """By how much the filter's bias of the gyro is in the flow reading at hand."""
+    """Share of the filter's gyro bias in the flow reading at hand."""
 
     share: float
 
@@ -196,7 +199,7 @@ class Reset(NamedTuple):
 
 
 class Sign(NamedTuple):
-    """What one unit of a fault of `hypotheses` adds to the component that is offered."""
+    """The change that one unit of a fault of `hypotheses` makes to the component that is offered."""
 
     fault: int
     value: float
@@ -210,7 +213,7 @@ class Doubt(NamedTuple):
 
 
 class Left(NamedTuple):
-    """What a fault may have left in a state unnoticed, which was taken for something else."""
+    """The error that a fault may have left undetected in a state, which was taken for something else."""
 
     state: int
     value: float
@@ -224,7 +227,7 @@ NO_RESET = Reset(-1, 0.0, 0.0)
 
 @equation
 def height_of(work: Work, lanes: Lanes, lane: int) -> Height:
-    """What the filter says of a lane's height."""
+    """The filter's height in a lane."""
     return Height(
         work[(STATE + POSITION + 2) * len(lanes) + lane],
         np.sqrt(variance_of(work, lanes, VELOCITY + 2, lane)),
@@ -234,7 +237,7 @@ def height_of(work: Work, lanes: Lanes, lane: int) -> Height:
 
 @equation
 def ground_below(work: Work, lanes: Lanes, lane: int) -> GroundBelow:
-    """What the filter says of the ground below a lane's vehicle."""
+    """The filter's estimate of the ground below a lane's vehicle."""
     height_m = work[(STATE + GROUND) * len(lanes) + lane] - work[(STATE + POSITION + 2) * len(lanes) + lane]
     both = variance_of(work, lanes, POSITION + 2, lane) + variance_of(work, lanes, GROUND, lane)
     variance = both - 2.0 * covariance_of(work, lanes, POSITION + 2, GROUND, lane)

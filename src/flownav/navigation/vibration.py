@@ -1,7 +1,7 @@
 """An accelerometer that lies: vibration is rectified, and a hover may read half of gravity less than there is.
 
 Two signs of it: readings that differ much from one to the next, and, where a filtered reading hides that, a range that
-contradicts the motion: it creeps out of its gate, or nothing else tells the height. Either lets the accelerometer's
+contradicts the motion: it creeps out of its gate, or nothing else measures the height. Either lets the accelerometer's
 biases walk and widens their limit, on every axis, so that range, flow, barometer or GPS keep the velocity.
 """
 
@@ -24,17 +24,17 @@ BLOCK_S, BLOCKS_FOLLOWED_S = 0.4, 4.0
 FOLLOWING_S = 1.0  # over which readings' scatter is followed (test_judges)
 DOUBT_M_S2 = 2.0  # of an accelerometer that the range contradicts
 DOUBT_LASTS_S = 60.0
-FREED_WALK_M_S2_RT_S = 0.02  # of a bias, for each time that the accelerometer is noisier than told
+FREED_WALK_M_S2_RT_S = 0.02  # of a bias, for each time that the accelerometer is noisier than stated
 with_doubt = replacing(ImuMemory, "doubt_m_s2")
 with_shaking = replacing(ImuMemory, "doubt_m_s2", "shaken_most")
-# So many times as before, and another vibration has begun, as when rotors spin up; one that has ended is forgotten
-# after so long. Both chosen: where every gust adds its share, the minutes without GPS of `outdoor` err by 0.77 instead
+# TWICE as much as before, and another vibration has begun, as when rotors spin up; one that has ended is forgotten
+# after FADING_S. Both chosen: where every gust adds its share, the minutes without GPS of `outdoor` err by 0.77 instead
 # of 0.68
 TWICE, FADING_S = 2.0, 300.0
 
 BIAS_LIMIT_SIGMAS = 3.0  # standard deviations that a limit leaves room for: chosen, as in `settings_of`
 # The ground has followed a height that errs: as many times what the range still contradicts may both be off. With 1 the
-# height of `flownav faults --offline --faults imu_bias` is beyond 3 sigma for 12 s unsaid, with 3 for 1 s.
+# height of `flownav faults --offline --faults imu_bias` is beyond 3 sigma for 12 s undetected, with 3 for 1 s.
 WITH_GROUND = 3.0
 DOUBTED_SPEED_M_S = 1.0  # what it may have done to the velocity: half a second of DOUBT_M_S2
 
@@ -53,7 +53,7 @@ def followed_gyro_power(reading: Reading, m: ImuMemory, dt_s: float) -> float:
     times its variance, and little of the vehicle's motion (`notch.followed_density`).
 
     Vibration that a unit of 50 Hz reads at its aliases turns an attitude as white noise does: 1 rad/s rms by 0.14 rad
-    in a second, which no datasheet knows.
+    in a second, which no datasheet states.
     """
     p = reading.value_0 - m.gyro_x - m.change_p
     q = reading.value_1 - m.gyro_y - m.change_q
@@ -119,7 +119,7 @@ def doubted_imu(
     """The range contradicts the motion that the accelerometer made: height, climb and vertical bias are set free.
 
     Where the range crept, the ground followed the height before, and the accelerometer may err on every axis; where it
-    jumped, it may be an echo. The memory, what is said of it, and the doubts; where not doubted, all as before.
+    jumped, it may be an echo. The memory, its event, and the doubts; where not doubted, all as before.
     """
     says = doubted and m.doubt_m_s2 < 0.5 * DOUBT_M_S2
     off_m = WITH_GROUND * contradiction_m if doubted else 0.0
@@ -136,7 +136,7 @@ def doubted_imu(
 
 
 class Shaken(NamedTuple):
-    """What vibration does over a step."""
+    """Memory of vibration after a step, and the doubts that it causes."""
 
     imu: ImuMemory
     doubts: tuple[Doubt, Doubt, Doubt, Doubt, Doubt, Doubt, Doubt, Doubt, Doubt]
@@ -146,7 +146,8 @@ class Shaken(NamedTuple):
 def add_vibration_noise(
     m: ImuMemory, start: StartMemory, step: MotionStep, factor: AccelFactors, *, dt_s: float, s: ImuSettings
 ) -> Shaken:
-    """Velocity and accelerometer bias are less sure by what vibration, or what is doubted, may have made of them.
+    """Doubts of velocity and accelerometer bias by the errors that vibration, or a doubted accelerometer, may have
+    caused.
 
     Vibration is rectified: an accelerometer that comes to be shaken more, as rotors spin up, may err by so much more.
     Only in lanes that the IMU moves.

@@ -5,7 +5,7 @@ as far as there is room: for the turning over a flow reading's exposure, and for
 now (`now`), from both of which a `spikes` judge of its own keeps spikes out. Of other sensors' readings each lies in
 a table until it is due; attitudes are kept, too, for the flow's turning where no inertial unit serves.
 
-The buffer is flat: records (`RINGS`), then the ring, the table and the attitudes, whose sizes the first record says.
+The buffer is flat: records (`RINGS`), then the ring, the table and the attitudes, whose sizes the first record states.
 """
 
 import numpy as np

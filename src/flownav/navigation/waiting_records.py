@@ -1,4 +1,4 @@
-"""Readings that wait: how they lie on the rings of `waiting`, whose sizes are told."""
+"""Readings that wait: how they lie on the rings of `waiting`, whose sizes are stated."""
 
 from typing import Annotated, Generic, NamedTuple, TypeVar
 
@@ -22,9 +22,9 @@ class Sizes(NamedTuple):
 
 
 class Queue(NamedTuple):
-    """What lies where: first of the ring's rows, how many lie there and how many of these were fed; how many in the
-    table; first of the attitudes and how many. order: of the newest reading that arrived. released_s: the instant up to
-    which readings were fed; newest_s: the newest that was described.
+    """Places of waiting readings: first of the ring's rows, how many lie there and how many of these were fed; how many
+    in the table; first of the attitudes and how many. order: of the newest reading that arrived. released_s: the
+    instant up to which readings were fed; newest_s: the newest that was described.
     """
 
     first: float = 0.0
@@ -51,9 +51,9 @@ class Kept(NamedTuple):
 
 
 class OwnGyro(NamedTuple):
-    """A flow sensor's own gyro that was taken for dead: what it said first about forward and right [rad/s], NaN before
-    it said anything, infinite once it has said something else; over how many readings it was held against the inertial
-    unit, and how much more it says on average [rad/s].
+    """A flow sensor's own gyro that was taken for dead: its first reading about forward and right [rad/s], NaN before
+    that, infinite once it has read something else; over how many readings it was compared with the inertial unit, and
+    how much more it reads on average [rad/s].
     """
 
     first_x: float = np.nan
@@ -118,7 +118,7 @@ class Inertial(NamedTuple):
 
 
 class Told(NamedTuple):
-    """An attitude that was told: its instant and quaternion, body to earth."""
+    """An external attitude: its instant and quaternion, body to earth."""
 
     t_s: float
     qw: float
@@ -191,9 +191,9 @@ def has_more(sensor: float) -> bool:
     return (sensor == FLOW_RATE) | (sensor == IMU) | (sensor == ATTITUDE)
 
 
-# -- how a reading is handed over ---------------------------------------------------------------------------
+# -- how a reading is passed in ---------------------------------------------------------------------------
 class BoardReading(NamedTuple, Generic[Value]):
-    """What a sensor read: values as `measurement.COLUMNS` has them; variances, NaN where the sensor states none and its
+    """A sensor's reading: values as `measurement.COLUMNS` has them; variances, NaN where the sensor states none and its
     datasheet serves; quality, a whole number from 0 to 255, 255 where it has none. It describes the instant delay_s
     before its time. exposure_s: for how long a flow sensor looked, up to its time: the vehicle's turning then is found
     for it; 0 for others. withheld: 0; 1: it is judged and not fused; 2: the sensor was due and did not come.

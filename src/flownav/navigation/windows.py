@@ -1,4 +1,4 @@
-"""What is read over half a second, and what it must show before a vehicle is said to stand; `still` uses it."""
+"""Readings over half a second, and the limits that they must keep before a vehicle is taken to stand (`still`)."""
 
 from typing import NamedTuple
 
@@ -23,12 +23,12 @@ QUIET_READINGS = (
 RESTING_TURN_RAD_S = 0.04  # 2 deg/s: at rest gyros read 0.002 to 0.018 (indoor-made/f-dropouts)
 STEADY_RANGE_M = 0.03  # at rest ranges span 0.01 m at most (indoor-made), in flight 0.03 to 0.05 in the median
 SPAN_SIGMAS = 4.0  # of white noise in a window's ranges, 8 to 30 of them: 2.8 to 4.1 sigma on average
-CONTACT_M = 0.35  # on the ground, where none was seen yet: sonars say 0.30 to all that is nearer (mocap, outdoor-2)
+CONTACT_M = 0.35  # on the ground, where none was seen yet: sonars read 0.30 for all that is nearer (mocap, outdoor-2)
 RESTING_FLOW_M_S, SHAKEN_FLOW_M_S = 0.3, 0.1  # on the ground 0 (indoor-made), 0.03 (outdoor), 0.17 (outdoor-2) at most
 # Nearer to the ground no lens is in focus, nor is its flow fused (`flow_min_height_m`): it does not show whether the
 # vehicle slides, and a range that stays there for half a second shows that it stands
 BLURRED_M = 0.05
-RESTING_GPS_M_S = 1.0  # on the ground receivers say 0.2 (outdoor) to 0.7 m/s (outdoor-3) at most
+RESTING_GPS_M_S = 1.0  # on the ground receivers read 0.2 (outdoor) to 0.7 m/s (outdoor-3) at most
 MOVES, SHAKEN, RESTS = 0.0, 1.0, 2.0  # what a vehicle does: it moves, stands with its motors on, or off
 NO_READINGS, NOTHING_SEEN = ImuWindow(), SeenWindow()
 
@@ -94,7 +94,7 @@ def is_steady(m: SeenWindow) -> bool:
 
 @equation
 def contact_range(contact_m: float) -> float:
-    """What a range reads at most of a vehicle on the ground [m]. contact_m: as it rested before, or NaN."""
+    """Largest range of a vehicle on the ground [m]. contact_m: as it rested before, or NaN."""
     return larger(CONTACT_M, contact_m + STEADY_RANGE_M if np.isfinite(contact_m) else 0.0)
 
 
@@ -107,7 +107,7 @@ def flow_speed(m: SeenWindow) -> float:
 
 @equation
 def judge_standing(gyro: ImuWindow, seen: SeenWindow, contact_m: float, last_m: float = np.nan) -> float:
-    """What a vehicle does that read this over a window: MOVES, SHAKEN, RESTS.
+    """State of motion of a vehicle by its readings over a window: MOVES, SHAKEN, RESTS.
 
     contact_m: the range when it rested before; last_m: the last range before this window; NaN where not known.
     """
@@ -124,7 +124,7 @@ def judge_standing(gyro: ImuWindow, seen: SeenWindow, contact_m: float, last_m: 
     unmoved = seen.gps_m_s < RESTING_GPS_M_S
     oftener = np.sqrt(larger(gyro.readings / QUIET_READINGS, 1.0))
     quiet = turning < oftener * QUIET_GYRO_RAD_S and shaking < oftener * QUIET_ACCEL_M_S2
-    seen_still = flow_m_s < RESTING_FLOW_M_S or was_near  # a lens on the ground sees nothing, and may say anything
+    seen_still = flow_m_s < RESTING_FLOW_M_S or was_near  # a lens on the ground sees nothing, and may report anything
     rests = enough and quiet and unmoved and seen_still and ((touching and steady) or (not ranged and not was_far))
     below = (touching and steady) or was_near
     blurred = touching and seen.range_high_m < BLURRED_M
@@ -155,7 +155,7 @@ def watch_imu(reading: Reading, m: ImuWindow) -> ImuWindow:
 
 @on_lanes
 def watch_range(reading: Reading, m: SeenWindow) -> SeenWindow:
-    """A range goes into the window, whatever the filter makes of it; many sensors say 0 for nothing."""
+    """A range goes into the window, whatever the filter makes of it; many sensors report 0 for no data."""
     ranged = is_heard(reading) and reading.value_0 > 0.0 and np.isfinite(reading.value_0)
     return with_range(reading.value_0, m) if ranged else m
 

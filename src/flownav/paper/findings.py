@@ -1,4 +1,4 @@
-"""What the reproduction says of the paper's claims, each sentence and verdict computed from the numbers.
+"""Findings of the reproduction on the paper's claims, each sentence and verdict computed from the numbers.
 
 Those marked `decides` make the command's exit status 1 where they do not agree.
 """
@@ -16,7 +16,7 @@ from flownav.scoring import errors
 
 FIT_TOLERANCE = 6.0
 LARGEST_TOLERANCE = 0.20
-SAME_FIT = 0.5  # points of fit that do not tell two orders apart
+SAME_FIT = 0.5  # points of fit that do not distinguish two orders
 SLOW_M_S = 0.4  # "small velocities of the pendulum which are below 0.4 m/sec"
 LOST_SLOPE = 0.5
 START_S = 2.0  # of a run, before the push is over
@@ -27,7 +27,7 @@ SAME_SPREAD = 1.5  # factor between standard deviations that count as alike
 class Finding(NamedTuple):
     """A claim of the paper, what came out here, and whether the two agree. decides: counts for the exit status.
 
-    circular: why an agreement says nothing, where what was flown was chosen from the very table; else empty.
+    circular: why an agreement is no evidence, where what was flown was chosen from the very table; else empty.
     """
 
     topic: str
@@ -45,7 +45,7 @@ class Finding(NamedTuple):
         return "agrees" if self.agrees else "differs"
 
     def as_json(self) -> dict[str, object]:
-        """What the command prints."""
+        """The finding as the command prints it."""
         return {name: value for name, value in self._asdict().items() if name != "decides"}
 
 
@@ -221,7 +221,7 @@ def of_flights(flights: Flights) -> list[Finding]:
 
 
 def circular(flights: Flights) -> str:
-    """Why positions that agree with Tables 5 and 6 say little: where the white GPS noise comes from."""
+    """Why positions that agree with Tables 5 and 6 are little evidence: where the white GPS noise comes from."""
     table_5 = errors.published(5)
     assert table_5 is not None
     printed = float(table_5["states"][BACK_SOLVED_STATE]["std_error"])

@@ -35,7 +35,9 @@ class LiftOff(NamedTuple):
 
     @property
     def frozen_inflow_share(self) -> Array:
-        """What the sensor's shake has no part in: the frozen inflow of B_red."""
+        """Share of the largest error that remains without the sensor's shake, which is due to the frozen inflow of
+        B_red.
+        """
         return self.unshaken_m_s / self.shaken_m_s
 
     def as_json(self) -> dict[str, Any]:
@@ -92,7 +94,7 @@ class Flights:
 
     @property
     def what(self) -> str:
-        """What is flown, in a word."""
+        """Name of the flight, in a word."""
         return {"takeoff": "take-off"}.get(self.scenario, self.scenario)
 
     def as_json(self) -> dict[str, Any]:

@@ -72,7 +72,7 @@ class OrderTest:
 
 
 class Identified(NamedTuple):
-    """What one run with another set-up is identified as: fit [%], gain a/c, delay b/c [s]."""
+    """Identification of one run with another set-up: fit [%], gain a/c, delay b/c [s]."""
 
     fit_percent: float
     gain: float
@@ -123,7 +123,9 @@ def configurations(seed: int) -> tuple[Configuration, ...]:
 
 
 def otherwise_instrumented(seed: int) -> tuple[Configuration, ...]:
-    """The fixed set-up with a gyro or a sonar that errs less, or more: what their errors do to what is identified."""
+    """The fixed set-up with a gyro or a sonar that errs less, or more: the effect of their errors on the
+    identification.
+    """
     one = RigSettings(runs=OTHER_RUNS, seed=seed)
     exact = "2013-09,-gyro-scale"
     late = "what PX4's estimator takes flow for where nobody says (EKF2_OF_DELAY)"

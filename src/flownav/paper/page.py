@@ -64,7 +64,7 @@ def gain_and_delay(laboratory: Laboratory) -> Panel:
         runs = laboratory.at(height)
         x, y = [1e3 * delay_s(r) for r in runs], [r.fits[2].point.gain for r in runs]
         traces.append(figures_rig.dots(f"here, {height:.1f} m", HERE, x, y, symbol=symbols[height], size=8))
-    caption = "What a slow velocity meets: gain a/c and delay b/c, the two numbers that a swing can tell."
+    caption = "Effect on a slow velocity: gain a/c and delay b/c, the two numbers that a swing can identify."
     figure = figures_rig.figure(traces, "delay b/c (ms)", "gain a/c", 400)
     return Panel("gain-delay", "Gain and delay of every model", caption, caption, figure)
 
@@ -140,7 +140,7 @@ def panels(flights: Flights) -> list[Panel]:
 
 
 def lift_off_caption(of: LiftOff | None) -> str:
-    """Where the transient comes from: the paper says the sensor's shake."""
+    """Where the transient comes from: the paper names the sensor's shake."""
     if of is None:
         return "The error in w about lift-off."
     shaken, unshaken, share = (spread(of_all) for of_all in (of.shaken_m_s, of.unshaken_m_s, of.frozen_inflow_share))

@@ -1,4 +1,5 @@
-"""What the paper printed: Tables 1 to 3, figures of its text, its inconsistencies, and the landings it compares with.
+"""The paper's printed figures: Tables 1 to 3, figures of its text, its inconsistencies, and the landings it compares
+with.
 
 Tables 5 and 6 are `scoring.paper_tables`.
 """

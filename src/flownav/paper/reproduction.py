@@ -1,4 +1,4 @@
-"""The whole reproduction, or one table of it: what is computed, as JSON, and what it says of the paper."""
+"""The whole reproduction, or one table of it: the computed results, as JSON, and their findings on the paper."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FLIGHT_TABLES = (5, 6)
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What was reproduced; what was not asked for is None or empty."""
+    """Results of the reproduction; a table that was not asked for is None or empty."""
 
     tables: tuple[int, ...]
     seed: int

@@ -91,7 +91,7 @@ def configurations(of: Reproduction) -> list[tuple[str, str, list[tuple[str, boo
 
 
 def instrument_rows(of: Reproduction) -> list[tuple[str, str, list[str]]]:
-    """What errors of gyro and sonar do to what is identified: name, words, gain, delay and fit by height.
+    """Effect of gyro and sonar errors on the identification: name, words, gain, delay and fit by height.
 
     The first is the fixed configuration's first run of each height.
     """

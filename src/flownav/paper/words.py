@@ -129,7 +129,7 @@ def _flight_table(flown: Flights) -> FlightTable:
 
 
 def leaking(flown: Flights) -> str:
-    """What a sensor that errs as the rig's does makes of the table."""
+    """Sentence on the effect of a sensor with the rig's errors on the table."""
     largest = (of["max_position_error_m"]["median"] for of in (flown.scores, flown.leaking))
     spreads = [
         f"{state} {flown.scores['states'][state]['std_error']['median']:.3f} to "

@@ -93,7 +93,7 @@ class BarometerReading(NamedTuple):
 
 @equation
 def draw_barometer(n: BarometerUnit, p: BarometerParameters) -> BarometerUnit:
-    """What this flight's port and air are like."""
+    """Port and air of this flight, from its draws."""
     return BarometerUnit(
         p.offset_sigma_m * n.offset_m,
         p.ramp_step_m * n.ramp_step_m,

@@ -1,6 +1,6 @@
 """The datasheets of a flow camera and of a camera that finds the pad, and the coefficients that follow from them.
 
-Of flow: what a sensor file (`datasheet.FlowSensor`: dynamics, noise, limits) does not say.
+Of flow: what a sensor file (`datasheet.FlowSensor`: dynamics, noise, limits) does not state.
 """
 
 import math
@@ -55,7 +55,7 @@ class Quality(ParameterModel):
 
 
 class Outliers(ParameterModel):
-    """What share of the readings is off by an error of this standard deviation."""
+    """Share of the readings that is off by an error of this standard deviation."""
 
     share: Number = Field(0.0, ge=0.0, le=1.0)  # of the readings, are outliers; 0: none
     sigma_rad_s: Number = Field(1.0, ge=0.0, le=100.0)  # error of an outlier, standard deviation

@@ -212,7 +212,7 @@ def load_sensor(path: Path | str | None = None) -> FlowSensor:
     return load(Path(path) if path is not None else shipped(DEFAULT_SENSOR), FlowSensor)
 
 
-# -- what the file says to those who use the sensor ---------------------------------------------------------------
+# -- the file's numbers for users of the sensor ---------------------------------------------------------------
 class IdentifiedFlow(NamedTuple):
     """Reported over true velocity of each body axis, the age of a reading, and sensor's axes = axes @ vehicle's.
 
@@ -245,7 +245,7 @@ def in_vehicle_axes(value: Array, identified: IdentifiedFlow, *, angular: bool) 
 
 
 def identified_axes(verdict: str) -> tuple[tuple[float, float], tuple[float, float]] | None:
-    """What a sensor file says of the axes, as sensor's = axes @ vehicle's; None where it does not know."""
+    """Axes by a sensor file's verdict, as sensor's = axes @ vehicle's; None where it does not know."""
     if "unclear" in verdict or "mirrored" in verdict.replace("not mirrored", ""):
         return None
     both = "signs of x and y" in verdict or "both signs" in verdict

@@ -15,10 +15,9 @@ is switched off there). w are the mean body rates over the exposure. On top of t
 - saturation at the fastest flow that the image search can follow.
 
 **Seeing.** Height and tilt within the sensor file's limits (`flow_engagement.engagement`, with its hysteresis), and
-texture; where it cannot see, quality and flow are 0. Texture is what the scenario says it is (1 everywhere, or 1 on the
-pad and 0 beside it: `pad_texture`); spells of low texture come on their own. **Quality** falls with the square of the
-height over the greatest and of the flow over the fastest, by the texture, and it is noisy: it says little about one
-reading.
+texture; where it cannot see, quality and flow are 0. Texture is the scenario's (1 everywhere, or 1 on the pad and 0
+beside it: `pad_texture`); spells of low texture come on their own. **Quality** falls with the square of the height over
+the greatest and of the flow over the fastest, by the texture, and it is noisy: it is little evidence on one reading.
 """
 
 from typing import NamedTuple
@@ -61,7 +60,7 @@ class FlowCameraParameters(NamedTuple):
 
 
 class FlowCameraTruth(NamedTuple):
-    """What the camera looks at and how it moves: the lens's velocity after the dynamics and body rates, body FRD.
+    """View and motion of the flow camera: the lens's velocity after the dynamics and body rates, body FRD.
 
     range_m: along the boresight. height_m: of the lens. texture: 0 (none) to 1.
     """

@@ -119,7 +119,7 @@ def roughness(pos_n_m: float, pos_e_m: float, ground: Ground) -> float:
 
 @equation
 def stepped(pos_n_m: float, pos_e_m: float, ground: Ground) -> float:
-    """What the step adds to the plane's height at this place [m]."""
+    """Height that the step adds to the plane at this place [m]."""
     g = ground
     beyond = (pos_n_m - g.edge_n_m) * g.direction_n + (pos_e_m - g.edge_e_m) * g.direction_e
     return g.step_m if beyond > 0.0 else 0.0

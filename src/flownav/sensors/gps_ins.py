@@ -52,7 +52,7 @@ class GpsInsParameters(NamedTuple):
 
 
 class NavSolution(NamedTuple):
-    """What the unit reports, and what a perfect one would: NED position and velocity, attitude body to earth."""
+    """A solution as the unit, or a perfect one, reports it: NED position and velocity, attitude body to earth."""
 
     pos_n_m: float
     pos_e_m: float

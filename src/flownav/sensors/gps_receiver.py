@@ -1,4 +1,4 @@
-"""A GPS receiver, 5 to 10 Hz: position and velocity of its antenna, and how good it says they are.
+"""A GPS receiver, 5 to 10 Hz: position and velocity of its antenna, and its stated accuracies.
 
 Position error of each axis: slow Gauss-Markov (ionosphere, ephemeris) + fast Gauss-Markov (multipath) + white, each
 advanced at the receiver's own period. Velocity: the receiver smooths it, a first-order lag, and adds Gauss-Markov and

@@ -14,8 +14,8 @@ deviation of N/sqrt(2 t). A bias walks by `walk` sqrt(t).
 **Vibration** at once a revolution of the rotor and at the blade rate. A rotating hub force is seen in quadrature by x
 and y; z and the rates have amplitudes of their own. The mean over the period T of a tone of frequency f is the tone at
 the middle of the period times sin(pi f T)/(pi f T), which `parameters` has put into the amplitudes together with the
-sensor's bandwidth. What is left beyond half the rate aliases by itself: the phase advances by the exact turn of one
-period, as a precomputed rotation, and by the little that this flight's rotor turns faster than it is said to.
+sensor's bandwidth. The part beyond half the rate aliases by itself: the phase advances by the exact turn of one period,
+as a precomputed rotation, and by the little that this flight's rotor turns faster than stated.
 """
 
 from typing import NamedTuple
@@ -76,7 +76,7 @@ class InertialParameters(NamedTuple):
 
 
 class InertialUnit(NamedTuple):
-    """What this very unit is, constant in flight: E, G and E' row by row (gyro_xy: of w_y in the x reading).
+    """This unit's own errors, constant in flight: E, G and E' row by row (gyro_xy: of w_y in the x reading).
 
     vibration: how strong this flight's is, against the datasheet's; faster: the share by which its rotor turns faster.
     """

@@ -144,7 +144,7 @@ class MagnetometerSheet(SensorSheet):
         )  # fmt: skip
 
 
-MODEL_YEAR = 2026.0  # declination changes by less than 0.3 deg a year; logs seldom say which year they are of
+MODEL_YEAR = 2026.0  # declination changes by less than 0.3 deg a year; logs seldom state their year
 COARSE_DEG = 0.1
 
 

@@ -83,7 +83,7 @@ class Noise(ParameterModel):
     exponent: Number = Field(1.0, ge=-4.0, le=4.0)  # of the height, in the law power; 0: the same at all heights
     accuracy: Number = Field(0.9, gt=0.0, lt=1.0)  # of the law accuracy: 1 - sigma/signal_sigma at the reference
     signal_sigma_m_s: Number | None = Field(None, gt=0.0, le=100.0, validate_default=True)  # of the law accuracy
-    floor_m_s: Number = Field(0.0, ge=0.0, le=100.0)  # least standard deviation, whatever the law says
+    floor_m_s: Number = Field(0.0, ge=0.0, le=100.0)  # least standard deviation, whatever the law gives
     min_height_m: Number = Field(gt=0.0, le=1000.0)  # below it the standard deviation stays
     max_height_m: Number = Field(gt=0.0, le=1000.0)  # above it the standard deviation stays
 

@@ -24,7 +24,7 @@ distance; also where the pad is out of view, while the height is within the limi
 across the sight, projected on the image plane), and of the distance, by noise, boresight and scale of the *datasheet*,
 which the camera's own may exceed, times a factor that is wrong by a share.
 
-**A fix** says where the pad's centre lies from the lens, as a downward camera and a target give it. It is what MAVLink
+**A fix** is the place of the pad's centre from the lens, as a downward camera and a target give it. It is what MAVLink
 LANDING_TARGET carries: tangents of the angles towards body forward and right, and the distance. The line of sight has
 white noise across it, the same both ways, and the distance a share of itself; readings are offered while the lens is
 between two heights and the pad's mark, whose sides lie north and east, is whole within a view that is so wide forward

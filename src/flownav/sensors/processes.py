@@ -1,9 +1,9 @@
-"""What sensors have in common: chance, errors that forget themselves, lags that are advanced exactly, whole steps.
+"""Processes that sensors share: chance, errors that forget themselves, lags that are advanced exactly, whole steps.
 
 **Chance.** An event at one reading, a spell of many, and a factor that is somewhat off.
 
-Every draw is a standard normal that the caller hands in. An event of probability P happens where the normal exceeds
-the level q with 1 - Phi(q) = P, so that no uniform draw is needed and masks stay selects.
+Every draw is a standard normal that the caller passes. An event of probability P happens where the normal exceeds the
+level q with 1 - Phi(q) = P, so that no uniform draw is needed and masks stay selects.
 
 A spell (no fix, no texture, a value that sticks) is a two-state chain that is advanced once a reading (Gilbert, Bell
 System Technical Journal 39, 1960, who modelled bursts of errors so): it ends with probability T/mean at each reading,
@@ -60,7 +60,7 @@ def factor(share: float, normal: float) -> float:
 
 
 def level_of(probability: float) -> float:
-    """What a standard normal exceeds with this probability: for 0 it never does, for 1 always.
+    """Level that a standard normal exceeds with this probability: for 0 it never does, for 1 always.
 
     ValueError where the probability is not between 0 and 1.
     """

@@ -1,15 +1,12 @@
 """A rangefinder along the boresight, lidar or sonar: what of the true distance it reports, and when it does not.
 
 - A wide beam reads the nearest ground inside its cone: over a plane that is the perpendicular, h, while the tilt is
-  below half the beam's width b, and h/cos(tilt - b) beyond; a narrow one reads the slant. (Over a step it is as over
-  a plane.)
-- A scale (a sonar's speed of sound, 0.17 % a kelvin) and an offset of this unit; noise with a part that grows with the
-  distance; whole steps.
-- Nothing nearer than the floor is told apart: the floor is what it reads (the HRLV-MaxSonar: 300 mm). Beyond the
-  ceiling, by slant range, or where the beam grazes the ground, there is no echo: the reading is the ceiling with
-  quality 0.
-- Echoes: half of them the second one, twice as far; half of something near. Spells in which it repeats its last value,
-  and spells in which nothing arrives. A unit may be stuck for good.
+below half the beam's width b, and h/cos(tilt - b) beyond; a narrow one reads the slant. (Over a step it is as over a
+plane.) - A scale (a sonar's speed of sound, 0.17 % a kelvin) and an offset of this unit; noise with a part that grows
+with the distance; whole steps. - Distances below the floor are not distinguished: it reads the floor (the
+HRLV-MaxSonar: 300 mm). Beyond the ceiling, by slant range, or where the beam grazes the ground, there is no echo: the
+reading is the ceiling with quality 0. - Echoes: half of them the second one, twice as far; half of something near.
+Spells in which it repeats its last value, and spells in which nothing arrives. A unit may be stuck for good.
 
 Last: the paper's rangefinder (HRLV-MaxSonar on the PX4FLOW, 10 Hz): floor, ceiling, resolution, noise, a stuck value.
 The sonar reports its floor, 300 mm, for anything nearer, whole millimetres, and nothing beyond 5 m (MaxBotix, HRLV-

@@ -1,4 +1,4 @@
-"""What a scenario file may say about GPS/INS, flow, rangefinder and pad camera, and the parameters built from it.
+"""Settings of a scenario file for GPS/INS, flow, rangefinder and pad camera, and the parameters built from it.
 
 Units stand in the keys; every default has a source in `docs/explanation/sensors.md`. `.parameters()` computes
 the coefficients that the equations use, so no exponential is left for the flight loop.
@@ -111,7 +111,7 @@ class GpsInsSettings(ParameterModel):
 
 
 class FlowSettings(ParameterModel):
-    """What a scenario says about the flow sensor beside its file: what is switched on, and the shake's mode.
+    """Settings of a scenario for the flow sensor beyond its file: which effects are switched on, and the shake's mode.
 
     identified_height_m and identified_model choose a row of the file's identified models instead of its own
     dynamics; constant_noise_m_s replaces its noise law.

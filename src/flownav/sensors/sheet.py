@@ -1,4 +1,4 @@
-"""What every sensor's datasheet has: a name, where its figures come from, its clock, and spells of chance.
+"""Entries of every sensor's datasheet: a name, where its figures come from, its clock, and spells of chance.
 
 A datasheet is a TOML file with units in its key names. `rate_hz` is how often the sensor reads, `latency_s` how old a
 reading is when it arrives, and `jitter_s` how unevenly it arrives: the age lies evenly within latency_s +- jitter_s.

@@ -1,6 +1,6 @@
 """The datasheets of IMU and GPS receiver with the coefficients that follow from them, and those of all that is carried.
 
-They are what simulation draws from and what the navigator is told.
+Simulation draws from them, and the navigator's settings follow from them.
 """
 
 import math
@@ -58,7 +58,7 @@ class Vibration(ParameterModel):
     """Tones at the rotor's and at the blades' frequency; the spreads are shares by which flights differ."""
 
     spread: Number = Field(0.0, ge=0.0, le=2.0)  # share by which flights differ in all amplitudes; 0: alike
-    speed_spread: Number = Field(0.0, ge=0.0, le=0.1)  # share by which rotors are not as fast as they are said to be
+    speed_spread: Number = Field(0.0, ge=0.0, le=0.1)  # share by which rotors differ from their stated speed
     rotor: Tone = Tone()
     blades: Tone = Tone()
 
@@ -99,7 +99,7 @@ class InertialSheet(SensorSheet):
         )
 
     def _tone(self, name: str, speed_rad_s: float) -> dict[str, float]:
-        """What a tone's turn in a period is, and what is left of its amplitudes."""
+        """A tone's turn in a period, and the remaining share of its amplitudes, as parameters by name."""
         tone = self.vibration.rotor if name == "rev" else self.vibration.blades
         left, turn = self.left_of_tone(speed_rad_s / (2.0 * math.pi)), speed_rad_s * self.period_s
         amplitudes = {key: left * amplitude for key, amplitude in in_si(tone, f"{name}_").items()}

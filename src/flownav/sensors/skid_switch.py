@@ -1,8 +1,8 @@
 """A switch under the skids: closed under load, debounced, and perhaps stuck.
 
-The load that it sees is the skids' with noise (rocking, vibration). It opens and closes at two loads, and what is
-reported follows once the contact has said the same for as many readings as the debounce takes (Ganssle, A Guide to
-Debouncing, 2004). A switch may be stuck open or closed for a whole flight.
+The load that it sees is the skids' with noise (rocking, vibration). It opens and closes at two loads, and the report
+follows once the contact has been the same for as many readings as the debounce takes (Ganssle, A Guide to Debouncing,
+2004). A switch may be stuck open or closed for a whole flight.
 """
 
 import math
@@ -42,7 +42,9 @@ class SkidSwitchNormals(NamedTuple):
 
 
 class SkidSwitchState(NamedTuple):
-    """The contact, what is reported (1 closed, 0 open), and for how many readings the contact has said otherwise."""
+    """The contact, the reported state (1 closed, 0 open), and for how many readings the contact has differed from
+    it.
+    """
 
     contact: float
     reported: float

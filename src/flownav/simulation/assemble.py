@@ -40,9 +40,9 @@ CORNER_S = 1.5  # a corner is flown at constant acceleration for so long: take-o
 
 @dataclass(frozen=True)
 class Setup:
-    """A scenario made ready: the numbers the kernel takes, and what reports say of them.
+    """A scenario made ready: the numbers that the kernel takes, and their description for reports.
 
-    fitted: the sensors that feed the navigator, and what it is told; None where the paper's filter flies. file: the
+    fitted: the sensors that feed the navigator, and its settings; None where the paper's filter flies. file: the
     vehicle's, as it is believed to be, and described: the same with its uncertainties. dispersion: what an ensemble
     draws.
     """
@@ -70,7 +70,7 @@ class Setup:
 
 
 def assemble(scenario: Scenario) -> Setup:
-    """Read, check, trim and discretise everything a scenario names. InputError as the loaders say."""
+    """Read, check, trim and discretise everything a scenario names. InputError as the loaders."""
     _require_what_is_linear(scenario)
     own_file = kinds.vehicle_file(Path(scenario.vehicle.file)) if scenario.vehicle.file else None
     sensor_file = Path(scenario.flow_sensor) if scenario.flow_sensor else None
@@ -131,7 +131,7 @@ def _values_of(described: kinds.VehicleDescription) -> dict[str, Any]:
 
 
 def _require_what_is_linear(scenario: Scenario) -> None:
-    """InputError where the paper's linear truth is asked for what it has not."""
+    """InputError where the scenario demands a part that the paper's linear truth has not."""
     if scenario.truth != "linear":
         return
     if scenario.wind.speed_20ft_m_s > 0.0:
@@ -152,7 +152,7 @@ def _require_paper_helicopter(scenario: Scenario, vehicle: kinds.AnyVehicle) -> 
 
 
 def _gains(scenario: Scenario, vehicle: kinds.AnyVehicle, hover: kinds.AnyTrim) -> AutopilotGains:
-    """The vehicle's gains, what the scenario says of them, and the last metres."""
+    """The vehicle's gains, the scenario's changes to them, and the last metres."""
     section = scenario.autopilot
     own_gate = scenario.filter.name != "paper" or section.go_around is not None  # the paper's landing has no gate
     precision = section.precision.model_dump() if section.precision is not None and own_gate else {}
@@ -180,7 +180,7 @@ def _may_learn(scenario: Scenario, hover: kinds.AnyTrim) -> bool:
 
 
 def _learns(scenario: Scenario, vehicle: kinds.AnyVehicle, hover: kinds.AnyTrim) -> Told | None:
-    """What is believed of a vehicle that may learn itself."""
+    """Beliefs about a vehicle that may learn itself; None where it may not."""
     if not _may_learn(scenario, hover) or not isinstance(hover, Trim) or isinstance(vehicle, MultirotorParameters):
         return None
     learning = scenario.autopilot.learning
@@ -204,7 +204,7 @@ def _plan(
     scenario: Scenario, vehicle: kinds.AnyVehicle, hover: kinds.AnyTrim, gains: AutopilotGains,
     dispersion: dict[str, Distribution],
 ) -> FlightPlan:  # fmt: skip
-    """What the loop is asked to do."""
+    """The flight plan for the loop."""
     section = scenario.flight
     linear = scenario.truth == "linear"
     on_ground = section.start == "ground" and not linear
@@ -231,7 +231,9 @@ def _plan(
 
 
 def start_of(scenario: Scenario) -> str:
-    """Where the filter starts: as the scenario says, else at the pad with white GPS noise and at the GPS with real."""
+    """Where the filter starts: as the scenario states, else at the pad with white GPS noise and at the GPS with
+    real.
+    """
     return scenario.filter.start or ("known" if scenario.gps.model == "white" else "gps")
 
 

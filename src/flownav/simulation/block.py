@@ -1,4 +1,4 @@
-"""What belongs together in a block of flights: its lanes and their noise, the navigator on board, how far it is.
+"""Parts of a block of flights: its lanes and their noise, the navigator on board, and its progress.
 
 Normals are drawn by the noise counter, each sensor's on its own channels, into rows of the lane buffer.
 """
@@ -41,8 +41,8 @@ class Aboard(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """taken: the next slot's number; following: that of the next reading that the navigator takes; heard: how many
-    inertial readings there were.
+    """taken: the next slot's number; following: that of the next reading that the navigator takes; heard: number of
+    inertial readings so far.
     """
 
     taken: int

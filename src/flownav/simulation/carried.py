@@ -61,7 +61,7 @@ class Said(NamedTuple):
 
 
 class Carrier(NamedTuple):
-    """What carries the sensors, and where."""
+    """The carrier of the sensors: vehicle, rotor, and the magnetic field at its place."""
 
     vehicle: AnyVehicle
     rotor: RotorFacts
@@ -71,11 +71,11 @@ class Carrier(NamedTuple):
 class CarriedSensor(NamedTuple):
     """One sensor. Its records are those that its laws are annotated with.
 
-    draw(n: Unit, p: Parameters) -> Unit; start(n: normals, p, ...) -> State, None where it has no state;
-    step(state, unit, n: normals, p, what it sees ...) -> (State, what it read), or what it read, or a named tuple of
-    records; see: laws that return what it sees; says: in the order of their slots; heard: a law of the reading as it
-    was told, after a fault; lever: the datasheet's table with the place of its lens; late: whether its readings may be
-    later than its datasheet says; phase: of its clock, in epochs.
+    draw(n: Unit, p: Parameters) -> Unit; start(n: normals, p, ...) -> State, None where it has no state; step(state,
+    unit, n: normals, p, inputs ...) -> (State, reading), or the reading, or a named tuple of records; see: laws that
+    return the inputs; says: in the order of their slots; heard: a law of the reading as it arrives, after a fault;
+    lever: the datasheet's table with the place of its lens; late: whether its readings may be later than its datasheet
+    says; phase: of its clock, in epochs.
     """
 
     name: str  # of its datasheet: in scenarios, dispersions, records and the names of its noise
@@ -181,7 +181,7 @@ _fixed: list[tuple[CarriedSensor, ...]] = []
 
 
 def carry(sensor: CarriedSensor) -> None:
-    """One more sensor for every vehicle, read after the others; before anything of the simulator is imported."""
+    """Add a sensor to every vehicle, read after the others; before anything of the simulator is imported."""
     if _fixed:
         raise RuntimeError(f"{sensor.name}: what vehicles carry is known once the simulator is imported")
     says = [said.say for said in sensor.says]

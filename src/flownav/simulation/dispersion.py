@@ -1,4 +1,4 @@
-"""What of the truth differs from flight to flight: the `[dispersion]` of a scenario, and its draws.
+"""Dispersion of the truth from flight to flight: the `[dispersion]` of a scenario, and its draws.
 
 Each entry names a number of the vehicle's file, of a sensor's datasheet or of the scenario's wind, and the distribution
 that it is drawn from, by SciPy's name with SciPy's parameters:
@@ -6,12 +6,13 @@ that it is drawn from, by SciPy's name with SciPy's parameters:
     vehicle.body.mass_kg = { distribution = "truncnorm", a = -2, b = 2, scale = 0.5, mode = "uncertainty" }
     wind.from_direction_deg = { distribution = "uniform", loc = 0, scale = 360 }
 
-`mode` says what is done with the draw: it is the value, a factor on what the datasheet says, an offset to it, or a
-multiple of the uncertainty that the file states beside the value (0.6, or "60..150": then of the side that it is on).
-Units are those of the number's own name.
+`mode` states the use of the draw: it is the value, a factor on the datasheet's value, an offset to it, or a multiple of
+the uncertainty that the file states beside the value (0.6, or "60..150": then of the side that it is on). Units are
+those of the number's own name.
 
-`known` says who could know the number before a flight, for the split of uncertainty in a certificate: "build", once the
-vehicle is built, weighed and calibrated; "day", on the day, from a forecast, a survey or a look at the place; "never".
+`known` states who could know the number before a flight, for the split of uncertainty in a certificate: "build", once
+the vehicle is built, weighed and calibrated; "day", on the day, from a forecast, a survey or a look at the place;
+"never".
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ DISPERSION_STEP = 1 << 41  # of the noise counter: beyond every step of a flight
 class Distribution(ParameterModel):
     """A continuous distribution of scipy.stats; what is not named here are its shape parameters.
 
-    known: what nobody says can be known is never known.
+    known: a number without `known` is never known.
     """
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
@@ -149,7 +150,7 @@ def raises_wind(entries: Mapping[str, Distribution]) -> bool:
 
 
 class Design(Protocol):
-    """What spreads the inputs of an ensemble's flights."""
+    """A design that spreads the inputs over an ensemble's flights."""
 
     def uniforms(self, seed: int, flights: Sequence[int], name: str) -> Array:
         """One number in (0, 1) of each flight for the input `name`, of (seed, flight, name) and nothing else."""

@@ -46,14 +46,14 @@ class Flown(NamedTuple):
 
 
 class Branches(NamedTuple):
-    """What the lanes of a block fly in place of the flights that their numbers name: each its truth, and its noise."""
+    """Truth and noise that each lane of a block flies in place of those of the flight with its number."""
 
     truths: Sequence[Truth]
     noise: Noise
 
 
 class Instead(NamedTuple):
-    """What a block meets that its flights' numbers do not say.
+    """Replacements for a block beyond the numbers of its flights.
 
     faults: of each lane's sensors, for a flight that `fails`. take: the address of what takes readings in place of the
     navigator, with a unit's interface (`navigation.take.UNIT_SIGNATURE`), of as many lanes.
@@ -92,7 +92,7 @@ def fly_into(
     flight: Flight, seed: int, first: int, lanes: tuple[int, ...], b: Buffers, ensemble: Ensemble | None = None,
     instead: Instead = NOTHING_ELSE, *, compiled: bool = True,
 ) -> None:  # fmt: skip
-    """Fly a block into its buffers, each lane as the flight's sheets say, as the ensemble draws it or as its branch is.
+    """Fly a block into its buffers, each lane by the flight's sheets, as the ensemble draws it or as its branch is.
 
     compiled False: in plain Python (tests; it is a thousand times slower). InputError as `Ensemble.truths`.
     """
@@ -118,7 +118,7 @@ def fly_into(
 def truths_of(
     flight: Flight, seed: int, first: int, lanes: int, ensemble: Ensemble | None, instead: Instead
 ) -> Sequence[Truth]:
-    """What the vehicle, the wind and the sensors of each lane are. InputError as `Ensemble.truths`."""
+    """Truth of each lane's vehicle, wind and sensors. InputError as `Ensemble.truths`."""
     truths: Sequence[Truth] = [believed(flight)] * lanes
     if instead.branches is not None:
         truths = instead.branches.truths
@@ -141,7 +141,7 @@ def fly_written(
 
 
 def learnt_in(work: Array, lanes: tuple[int, ...]) -> list[tuple[Learnt, LoopGains]]:
-    """What each lane of a block that was flown has learnt of its vehicle, and the gains that it ended with."""
+    """Result of learning in each lane of a block that was flown, and the gains that it ended with."""
     rows = work.reshape(-1, len(lanes))
     learnt, gains = (
         rows[first : first + len(record._fields)]
@@ -196,7 +196,7 @@ def fly_blocks(
 def in_order(
     pool: ThreadPoolExecutor, do: Callable[[int], Result], each: Iterable[int], ahead: int
 ) -> Iterator[Result]:
-    """What `do` makes of each, in order; so many at most are asked for ahead of what has been taken."""
+    """Results of `do` for each, in order; at most `ahead` are under way before the first is taken."""
     waiting: deque[Future[Result]] = deque()
     for one in each:
         waiting.append(pool.submit(do, one))

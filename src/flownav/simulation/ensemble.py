@@ -1,4 +1,5 @@
-"""An ensemble: flights each with a truth of its own, drawn from the scenario's dispersion, that nobody told the filter.
+"""An ensemble: flights each with a truth of its own, drawn from the scenario's dispersion, which the filter does not
+know.
 
 The navigator's settings, its timetable and the autopilot's gains stay those of the datasheets. A truth is a function of
 (seed, flight) alone, so that a flight is the same by itself, in any batch and on any lane.
@@ -47,7 +48,7 @@ LOT_FLIGHTS = 64  # flights whose numbers are drawn together
 
 
 def believed(flight: Flight) -> Truth:
-    """The truth of a flight that is what its datasheets say; the sensors that it has not are zeros."""
+    """The truth of a flight by its datasheets; the sensors that it has not are zeros."""
     onboard = flight.onboard
     if onboard is None:
         none = {part: PARTS[part](*([0.0] * SIZES[part])) for part in (*NAMES, "camera_flow")}
@@ -82,10 +83,10 @@ def recirculation_of(
 
 
 class Ensemble:
-    """What differs from flight to flight of one scenario, ready to be drawn. InputError where an entry cannot be.
+    """Dispersed numbers of one scenario, ready to be drawn for each flight. InputError where an entry cannot be.
 
     file and described: the vehicle's, as it is believed to be; sheets: its sensors', None where the paper's filter
-    flies, of whose sensors only the flow sensor's file is dispersed; dispersion: entries by dotted name. design: what
+    flies, of whose sensors only the flow sensor's file is dispersed; dispersion: entries by dotted name. design:
     spreads them over the flights; None: the noise counter.
     """
 
@@ -133,7 +134,7 @@ class Ensemble:
     def _drawn(self, seed: int, number: int) -> dict[str, Array]:
         """The numbers of LOT_FLIGHTS flights, the `number`-th such lot: SciPy takes as long for one as for all of them.
 
-        A flight stands at the same place of the same lot whoever asks for it, and so has the same bits.
+        A flight stands at the same place of the same lot in every call, and so has the same bits.
         """
         flights = range(number * LOT_FLIGHTS, (number + 1) * LOT_FLIGHTS)
         spread = uniforms if self.design is None else self.design.uniforms
@@ -151,7 +152,7 @@ class Ensemble:
         return np.array([drawn(entry.mode, float(draw), told, below, above) for draw in draws])
 
     def _truth(self, flight: int, values: Mapping[str, float]) -> Truth:
-        """One flight's truth: what the drawn numbers touch is built anew, the rest is what is believed."""
+        """One flight's truth: parts that the drawn numbers touch are built anew, the rest is as believed."""
         touched: dict[str, dict[str, float]] = {}
         for name, value in values.items():
             source, _, key = name.partition(".")
@@ -189,7 +190,7 @@ class Ensemble:
         return PUNCTUAL._replace(**late)
 
     def _carried(self, name: str) -> bool:
-        """Whether the vehicle has what an entry is of; what another kind has, or a known sensor, is passed over."""
+        """Whether the vehicle has the part of an entry; a part of another kind, or a known sensor, is passed over."""
         source = name.partition(".")[0]
         if source == "vehicle" and name.split(".")[1] in OF_A_KIND - set(self.contents["vehicle"]):
             return False
@@ -215,7 +216,7 @@ class Ensemble:
             raise self._wrong(name, str(error)) from None
 
     def believed_of(self, name: str) -> float:
-        """What the datasheet says of a number."""
+        """The datasheet's value of a number. InputError where there is none."""
         source, _, key = name.partition(".")
         inside: Any = self.contents[source]
         for part in key.split("."):

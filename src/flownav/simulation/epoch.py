@@ -1,4 +1,4 @@
-"""The parts of one epoch of the closed loop: what is flown on, the outer and the attitude loop, the plant."""
+"""The parts of one epoch of the closed loop: the autopilot's estimate, the outer and the attitude loop, the plant."""
 
 from typing import NamedTuple
 
@@ -44,7 +44,7 @@ over_home = replacing(Estimate, "pos_n", "pos_e", "pos_d")
 
 @PLANT.on_lanes
 def estimate_for_autopilot(state: HelicopterState, said: Estimated, felt: Felt, *, on_truth: bool) -> Estimate:
-    """What the outer loop flies on: the filter's estimate or the truth, and the force that the IMU felt."""
+    """The outer loop's feedback: the filter's estimate or the truth, and the specific force read by the IMU."""
     return Estimate(
         state.pos_n if on_truth else said.pos_n_m,
         state.pos_e if on_truth else said.pos_e_m,
@@ -68,7 +68,7 @@ def note_home(work: Work, lanes: Lanes, epoch: int, reference: Reference, flight
 
 @PLANT.on_lanes
 def put_home(estimate: Estimate, *, reference: Reference) -> Home:
-    """Where the estimate puts the pad, if the vehicle is where its path says."""
+    """Where the estimate puts the pad, if the vehicle is at the reference of its path."""
     return Home(estimate.pos_n - reference.pos_n, estimate.pos_e - reference.pos_e, estimate.pos_d - reference.pos_d)
 
 
@@ -89,7 +89,7 @@ def mind_skids(
     before: AutopilotState, loads: Loads, skids: Landed, *, may_fly: float, may_land: float, threshold_n: float,
     onboard: Onboard | None,
 ) -> AutopilotState:  # fmt: skip
-    """The landing logic. With sensors of its own, the skid switch is all that the autopilot knows of its skids."""
+    """The landing logic. With sensors of its own, the autopilot knows its skids by their switch only."""
     contact_n = loads.contact_n if onboard is None else 2.0 * threshold_n * skids.landed
     return landing_logic(before, contact_n, threshold_n, may_fly, may_land, EPOCH_S)
 
@@ -99,7 +99,7 @@ def follow_path(
     before: AutopilotState, estimate: Estimate, home: Home, said: Estimated, known: Knowledge, loops: LoopGains, *,
     may_land: float, reference: Reference, gains: AutopilotGains, learns: Told | None,
 ) -> AutopilotState:  # fmt: skip
-    """The outer loop, at the attitude that the filter, or the INS, says."""
+    """The outer loop, at the attitude by the filter or the INS."""
     relative = over_home(
         estimate, pos_n=estimate.pos_n - home.north_m, pos_e=estimate.pos_e - home.east_m,
         pos_d=estimate.pos_d - home.down_m,
@@ -121,7 +121,7 @@ def note_inputs(autopilot: AutopilotState, controls: Controls, *, gains: Autopil
 def steer(
     work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None, onboard: Onboard | None, own: OwnParts | None
 ) -> None:
-    """The attitude loop's controls for the next 4 ms, by ours or by a controller of somebody else's."""
+    """The attitude loop's controls for the next 4 ms, by ours or by a user's own controller."""
     if own is not None and own.steer != 0:
         invoke(own.steer, work)
     else:
@@ -129,7 +129,7 @@ def steer(
 
 
 class Steered(NamedTuple):
-    """The attitude loop's state and what it asks for."""
+    """The attitude loop's state and its commands."""
 
     autopilot: AutopilotState
     controls: Controls
@@ -162,7 +162,7 @@ def steer_blades(
 
 @equation
 def asked(stir: Stir, lon: float, lat: float) -> Stir:
-    """What has been asked of the cyclics in this epoch, with one step of the attitude loop more."""
+    """The stir with one more step of the attitude loop added to the cyclic commands of this epoch."""
     return Stir(
         stir.lon + stir.lon_step, stir.lat + stir.lat_step, stir.lon_step, stir.lat_step,
         stir.asked_lon + lon / ATTITUDE_STEPS, stir.asked_lat + lat / ATTITUDE_STEPS,
@@ -179,7 +179,7 @@ def ins_attitude(state: HelicopterState, error: GpsInsErrors) -> Quaternion:
 
 @equation
 def own_attitude(state: HelicopterState, error: AttitudeError) -> Quaternion:
-    """The navigator's attitude of this epoch, turned on since then as the flybarless unit's gyros say."""
+    """The navigator's attitude of this epoch, turned on since then by the flybarless unit's gyros."""
     return quaternion_product((error.w, error.x, error.y, error.z), (state.qw, state.qx, state.qy, state.qz))
 
 
@@ -206,7 +206,7 @@ def follow_flow(
 
 @equation
 def move(work: Work, lanes: Lanes, dt: float, flight: Flight, onboard: Onboard | None, own: OwnParts | None) -> None:
-    """One step of the vehicle, ours or somebody else's."""
+    """One step of the vehicle, ours or a user's own."""
     if own is not None and own.step != 0:
         invoke(own.step, work, dt)
     else:
@@ -215,7 +215,7 @@ def move(work: Work, lanes: Lanes, dt: float, flight: Flight, onboard: Onboard |
 
 @equation
 def observe(work: Work, lanes: Lanes, flight: Flight, onboard: Onboard | None, own: OwnParts | None) -> None:
-    """Thrust, ground load and power of the present state; somebody else's vehicle has said them as it moved."""
+    """Thrust, ground load and power of the present state; a user's own vehicle has reported them as it moved."""
     if own is None or own.step == 0:
         observe_vehicle(work, lanes, flight.rotors, onboard)
 

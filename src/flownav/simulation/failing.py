@@ -1,8 +1,8 @@
-"""Sensors that fail in flight: a reading on its way from its sensor becomes what a failed one would have said.
+"""Sensors that fail in flight: a reading on its way from its sensor becomes that of a failed one.
 
-A fault is part of a flight's truth, which nobody is told: each lane has its own. It strikes the readings that are taken
-in [begins_s, ends_s); the sizes are those of `faults.catalogue`, whose injectors do the same to a log, and tests hold
-the two together.
+A fault is part of a flight's truth, unknown to navigator and autopilot: each lane has its own. It strikes the readings
+that are taken in [begins_s, ends_s); the sizes are those of `faults.catalogue`, whose injectors do the same to a log,
+and tests hold the two together.
 """
 
 from typing import NamedTuple
@@ -36,7 +36,7 @@ load_normals, _ = lane_access(FaultNormals, layout.FAULT_NORMALS)
 
 @equation
 def even(normal: float) -> float:
-    """What is even between 0 and 1, of a standard normal: its distribution function within 1e-14.
+    """A number that is uniform between 0 and 1, of a standard normal: its distribution function within 1e-14.
 
     J. F. Hart et al., Computer Approximations, 1968, number 5666, a rational function and exp(-x^2/2).
     """
@@ -69,7 +69,7 @@ def strikes(sensor: int, fault: SensorFault) -> bool:
 
 @equation
 def failed(read: Reading, earlier: Reading, held: float, since_s: float, n: FaultNormals, f: SensorFault) -> Reading:
-    """What a failed sensor says instead of `read`, so long after the fault began.
+    """The reading of a failed sensor in place of `read`, since_s after the fault began.
 
     earlier: its reading `f.late_readings` before; held: its first value before the fault.
     """
@@ -132,7 +132,7 @@ def strike(work: Work, lanes: Lanes, seed: int, flight: int, taken: Taken) -> No
 
 @equation
 def remember(work: Work, lanes: Lanes, lane: int, read: Reading, count: int, late: int) -> Reading:
-    """Keep a reading among the last of its sensor; the one of so many before."""
+    """Keep a reading among the last of its sensor; return the one that came `late` readings before."""
     kept = layout.FAULT_EARLIER + FIELDS * (count % layout.EARLIER_READINGS)
     store_row(work, lanes, kept, lane, read)
     row = layout.FAULT_EARLIER + FIELDS * ((count - late) % layout.EARLIER_READINGS)

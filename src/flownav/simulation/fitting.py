@@ -1,10 +1,10 @@
-"""From a scenario to the sensors that feed the navigator: datasheets, clocks, and what the navigator is told.
+"""From a scenario to the sensors that feed the navigator: datasheets, clocks, and the navigator's settings.
 
 **The timetable**, one for all flights of a scenario. Every reading has three times: the instant at which it was taken,
-the instant that it describes as far as anybody knows (`t_s`: its arrival less the age that the datasheet states;
-arrivals are uneven, so this is off by the jitter), and the epoch in which the navigator takes it, a fixed horizon
-later. Readings are taken in the order of `t_s`, as a live session's horizon releases them. The timetable is a
-scenario's, not a flight's: what differs from flight to flight is what was read and whether it arrived.
+the instant that it describes as far as is known (`t_s`: its arrival less the age that the datasheet states; arrivals
+are uneven, so this is off by the jitter), and the epoch in which the navigator takes it, a fixed horizon later.
+Readings are taken in the order of `t_s`, as a live session's horizon releases them. The timetable is a scenario's, not
+a flight's: only the values and whether they arrived differ from flight to flight.
 """
 
 from __future__ import annotations
@@ -48,7 +48,8 @@ START_WAIT_S = 10.0  # the navigator's default start_wait_s
 
 
 class Fitted(NamedTuple):
-    """What flies: sensors, their timetable, the navigator's settings (and packed), its equipment, the sheets.
+    """The equipment of a flight: sensors, their timetable, the navigator's settings (and packed), its equipment, the
+    sheets.
 
     ages_s: how old the navigator takes a reading to be on arrival, by `measurement.Sensor`.
     """
@@ -64,7 +65,7 @@ class Fitted(NamedTuple):
 
 
 def fitted(scenario: Scenario, flow_sensor: FlowSensor, vehicle: AnyVehicle, epochs: int) -> Fitted:
-    """The vehicle's sensors as a scenario wants them. InputError as the sheets' loaders say."""
+    """The vehicle's sensors as a scenario wants them. InputError as the sheets' loaders."""
     sheets = sheets_of(scenario, flow_sensor, vehicle)
     onboard = onboard_of(scenario, sheets, scenario.flow.parameters(flow_sensor), vehicle)
     timing = timing_of(sheets, flow_sensor)
@@ -78,7 +79,7 @@ def fitted(scenario: Scenario, flow_sensor: FlowSensor, vehicle: AnyVehicle, epo
 
 
 def packed(told: Told, equipment: Equipment) -> Array:
-    """What the navigator is told, as its kernels take it."""
+    """The navigator's settings, as its kernels take them."""
     sigma = told.settings.start_sigma(has_heading=True, compass=True)
     return pack(told.settings.settings(equipment, told.noise), sigma)
 
@@ -95,9 +96,9 @@ def refitted(
     carried: Fitted, epochs: int, *, told: Told | None = None, onboard: Onboard | None = None,
     stated: dict[Sensor, Timing] | None = None,
 ) -> Fitted:  # fmt: skip
-    """A vehicle whose navigator is told something else, or that carries something else; what is None stays.
+    """The same vehicle with other settings of its navigator, or other sensors; what is None stays.
 
-    stated: how old readings are said to be; how old they are stays.
+    stated: ages of readings as the navigator takes them; the true ages stay.
     """
     told, onboard, stated = told or carried.told, onboard or carried.onboard, stated or carried.timing
     return carried._replace(
@@ -111,7 +112,7 @@ def refitted(
 
 # -- datasheets -----------------------------------------------------------------------------------------------
 def sheets_of(scenario: Scenario, flow_sensor: FlowSensor, vehicle: AnyVehicle) -> SensorSheets:
-    """Every sheet as the scenario wants it, where it names one or one ships. InputError as the sheets' loaders say."""
+    """Every sheet as the scenario wants it, where it names one or one ships. InputError as the sheets' loaders."""
     lens_down_m = vehicle.cg_above_skid_m - scenario.vehicle.lens_above_skid_m
     files = {one.name: getattr(scenario.sensors, one.name) for one in CARRIED}
     sheets = {
@@ -123,7 +124,7 @@ def sheets_of(scenario: Scenario, flow_sensor: FlowSensor, vehicle: AnyVehicle) 
 
 
 def carried_sheets() -> type[SensorSheets]:
-    """The model of all sheets: those that the navigator may be told of, and what else is carried."""
+    """The model of all sheets: those that the navigator may use, and the other sensors that are carried."""
     others: dict[str, Any] = {
         one.name: (one.sheet | None, None) for one in CARRIED if one.name not in SensorSheets.model_fields
     }
@@ -147,7 +148,7 @@ def onboard_of(scenario: Scenario, sheets: SensorSheets, flow: FlowParameters, v
 
 
 def fitting_of(scenario: Scenario, one: CarriedSensor, sheet: SensorSheet | None, on: Carrier) -> Fitting:
-    """One sensor as its sheet says; where the vehicle has none, zeros and a clock that never comes."""
+    """One sensor by its sheet; where the vehicle has none, zeros and a clock that never comes."""
     if sheet is None:
         nothing = one.parameters(*[0.0] * len(one.parameters._fields))
         return Fitting(nothing, NEVER, Place(0.0, 0.0, 0.0) if one.lever else None)
@@ -164,8 +165,8 @@ def place_of(lens: Lever) -> Place:
 def timing_of(sheets: SensorSheets, flow_sensor: FlowSensor) -> dict[Sensor, Timing]:
     """How old each sensor's readings are.
 
-    The flow sensor's own lag is what its file says of a slow signal, b/c, unless the navigator carries its dynamics as
-    states: then a reading is of its own instant.
+    The flow sensor's own lag is its file's for a slow signal, b/c, unless the navigator carries its dynamics as states:
+    then a reading is of its own instant.
     """
     found: dict[Sensor, Timing] = {Sensor.IMU: Timing(0.0, float(sheets.inertial.latency_s), 0.0)}
     lag_s = 0.0 if needs_lag_states(flow_sensor) else flow_sensor.dynamics.delay_s
@@ -245,7 +246,7 @@ def sampled_readings(
 def clocks(sensors: Onboard) -> list[tuple[Sensor, int, Clock]]:
     """Every reading of a fitted sensor but the inertial one, in the order in which `sampling.sample` takes them.
 
-    Its kind, the key of its jitter, and its clock. What a sensor says at one time arrives together.
+    Its kind, the key of its jitter, and its clock. All readings of a sensor at one time arrive together.
     """
     found, seen = [], Counter[Sensor]()
     for sensor in CARRIED:

@@ -73,7 +73,7 @@ def start_block(b: Block, flight: Flight, onboard: Onboard | None) -> None:
 
 @equation
 def observe_start(work: Work, lanes: Lanes, flight: Flight, onboard: Onboard | None, own: OwnParts | None) -> None:
-    """Thrust, ground load and power before the first epoch, for which somebody else's vehicle begins."""
+    """Thrust, ground load and power before the first epoch, for which a user's own vehicle begins."""
     if own is not None and own.step != 0:
         invoke(own.step, work, 0.0)
     else:
@@ -100,7 +100,7 @@ def begin_epoch(b: Block, epoch: int, flight: Flight) -> Reference:
 
 @equation
 def decide_on_paper(b: Block, epoch: int, flight: Flight) -> Reference:
-    """One epoch of the paper's sensors and its filter, or of no filter at all, up to what the autopilot asks for."""
+    """One epoch of the paper's sensors and its filter, or of no filter at all, up to the autopilot's commands."""
     work, lanes = b.work, b.lanes
     reference = begin_epoch(b, epoch, flight)
     sense(work, lanes, epoch, flight.sensors)
@@ -140,7 +140,7 @@ def epochs_on_paper(note: Callable[..., None]) -> Callable[..., None]:
 def decide_navigated(
     b: Block, aboard: Aboard, flight: Flight, onboard: Onboard, table: navigating.Timetable, epoch: int, at: Progress
 ) -> tuple[Progress, Reference]:
-    """One epoch of the vehicle's own sensors and the navigator, up to what the autopilot asks for."""
+    """One epoch of the vehicle's own sensors and the navigator, up to the autopilot's commands."""
     work, lanes, nav, t_s = b.work, b.lanes, aboard.nav, epoch * EPOCH_S
     ahead = table.horizon_epochs * inertial_parts(onboard)
     reference = begin_epoch(b, epoch, flight)
@@ -163,7 +163,8 @@ def decide_navigated(
 
 
 def epochs_navigated(note: Callable[..., None]) -> Callable[..., None]:
-    """An equation: every epoch with the vehicle's own sensors and the navigator, on whose estimate of now it is flown.
+    """An equation: every epoch with the vehicle's own sensors and the navigator, whose estimate of now the autopilot
+    uses.
 
     note: as of `epochs_on_paper`.
     """
@@ -187,7 +188,7 @@ def note_history(
     work: Work, lanes: Lanes, epoch: int, reference: Reference, flight: Flight, onboard: Onboard | None,
     history: NDArray[np.float64],
 ) -> None:  # fmt: skip
-    """What an epoch shows, into the flights' history."""
+    """Write an epoch into the flights' history."""
     write_history(work, lanes, epoch, reference, history)
 
 
@@ -212,8 +213,8 @@ def fly(
 def fly_block(flight: Flight, truth: NDArray[np.float64], block: Block, buffers: Buffers, take: int) -> None:
     """Fly the flights of a block, whose lane buffer is scratch, zeroed here.
 
-    truth: `truth.packed_truth` of the lanes. Of the buffers the navigator, taken at the address `take`, has heard
-    nothing; tape, what it is fed and history are filled.
+    truth: `truth.packed_truth` of the lanes. The buffers' navigator, taken at the address `take`, is a new one; the
+    tape, the readings fed and the history are filled.
     """
     lanes, tape, work = block.lanes, buffers.tape, block.work
     for i in range(work.size):
@@ -254,7 +255,7 @@ def start_position(x: PaperState, state: HelicopterState, measured: Measured, *,
 
 @equation
 def run_filter(work: Work, lanes: Lanes, epoch: int, paper: PaperModel | None) -> None:
-    """Predict over the last epoch, correct with this one's readings, and say what is estimated.
+    """Predict over the last epoch, correct with this one's readings, and return the estimate.
 
     The compiler drops the branch where the filter is None.
     """
@@ -273,7 +274,7 @@ def run_paper_filter(work: Work, lanes: Lanes, epoch: int, model: PaperModel) ->
 
 
 class Stated(NamedTuple):
-    """What the filter says."""
+    """The filter's estimate and its spread."""
 
     estimated: Estimated
     spread: Spread
@@ -291,5 +292,5 @@ def say_state(said: Estimated, x: PaperState, variance: PaperVariance) -> Stated
 
 @PLANT.on_lanes
 def say_ins_attitude(said: Estimated, gps: NavSolution) -> Estimated:
-    """A filter without an attitude of its own says the INS's."""
+    """A filter without an attitude of its own reports the INS's."""
     return with_attitude(said, qw=gps.qw, qx=gps.qx, qy=gps.qy, qz=gps.qz)

@@ -1,7 +1,8 @@
-"""From one flight to its Record: the truth, what was estimated and flown on, readings, innovations, events.
+"""From one flight to its Record: the truth, the estimates and those that the autopilot used, readings, innovations,
+events.
 
-A flight on the navigator keeps what the navigator was fed, reading by reading, so that `flownav replay` of the record
-runs the same navigator on the same readings.
+A flight on the navigator keeps the readings that the navigator was fed, so that `flownav replay` of the record runs the
+same navigator on the same readings.
 """
 
 from collections.abc import Callable
@@ -55,7 +56,7 @@ def record_of(setup: Setup, flown: Flown, seed: int, index: int, lane: int = 0) 
 
 
 def _learnt(setup: Setup, flown: Flown, lane: int) -> dict[str, Any]:
-    """What the flight learnt of its vehicle, and the gains for it; nothing where none was to be learnt.
+    """Manifest entries of the vehicle as the flight learnt it, and the gains for it; empty where none was to be learnt.
 
     The margins that these keep are `control.learnt_margins.margins_of_record`.
     """
@@ -73,7 +74,7 @@ def _learnt(setup: Setup, flown: Flown, lane: int) -> dict[str, Any]:
 def _befallen(
     t_s: Array, history: dict[tuple[str, str], Array], event: EventSection
 ) -> list[tuple[float, str, str, str, float]]:
-    """What befell the vehicle, if the flight got so far."""
+    """Rows of the events that befell the vehicle, if the flight got so far."""
     after = np.flatnonzero(t_s >= event.at_s)
     if not len(after):
         return []
@@ -82,7 +83,7 @@ def _befallen(
 
 
 def _manifest(setup: Setup, seed: int, index: int, duration_s: float) -> dict[str, Any]:
-    """What was flown, with what."""
+    """Manifest of a flight: scenario, sensors, parameters and provenance."""
     scenario = setup.scenario
     facts: dict[str, Any] = {
         "kind": "fly",
@@ -109,13 +110,13 @@ def _manifest(setup: Setup, seed: int, index: int, duration_s: float) -> dict[st
 def _add_papers(
     record: Record, setup: Setup, history: dict[tuple[str, str], Array], t_s: Array, table: Callable[..., None]
 ) -> None:
-    """The paper's filter (or none), which takes the INS's attitude as it comes and says nothing of its consistency."""
+    """The paper's filter (or none), which takes the INS's attitude as it comes and states no consistency."""
     attitude = {name: history["gps", name] for name in QUATERNION}
     own = tuple(c for c in TABLES["estimate"] if c not in (*QUATERNION, *PROTECTION_LEVELS))
     table("estimate", "estimate", own, **attitude)
     every = np.full(len(t_s), 255.0)
     table("gps_position", "gps", COLUMNS[Sensor.GPS_POSITION], quality=every)
-    if setup.scenario.gps.model != "white":  # with white noise the unit's velocity is the truth and nobody's input
+    if setup.scenario.gps.model != "white":  # with white noise the unit's velocity is the truth and no input
         table("gps_velocity", "gps", COLUMNS[Sensor.GPS_VELOCITY], quality=every)
     table("attitude", "gps", COLUMNS[Sensor.ATTITUDE], quality=every)
     table("flow_velocity", "flow", (*VELOCITY_BODY, "sigma_m_s"), quality=255.0 * history["flow", "engaged"])
@@ -125,7 +126,9 @@ def _add_papers(
 
 
 def _add_navigators(record: Record, setup: Setup, flown: Flown, lane: int) -> list[tuple[float, str, str, str, float]]:
-    """What the navigator said at its horizon, what it was fed, what became of each component; what happened to it."""
+    """Add the navigator's estimates at its horizon, its readings, and the outcome of each component; return its
+    events.
+    """
     estimate = flown.tape.estimates(lane)
     record.add("estimate", estimate_table(estimate))
     record.add("states", states_table(estimate))
@@ -144,7 +147,7 @@ def _add_navigators(record: Record, setup: Setup, flown: Flown, lane: int) -> li
 
 
 def fed_rows(setup: Setup, flown: Flown, lane: int) -> Array:
-    """What one lane's navigator was fed, row by row as `record.FED` has it."""
+    """Rows of one lane's readings as its navigator was fed them, with the columns of `record.FED`."""
     assert setup.fitted is not None
     schedule = setup.fitted.schedule
     taken = int(np.searchsorted(schedule.epoch, setup.flight.plan.epochs))
@@ -195,7 +198,7 @@ def _events(
     t_s: Array, flown: dict[tuple[str, str], Array], happened: list[tuple[float, str, str, str, float]], *,
     by_sensor: bool,
 ) -> Table:  # fmt: skip
-    """What happened to the navigator, lift-off and touchdown, engagements of the paper's flow sensor, in time order."""
+    """Events in time order: the navigator's, lift-off and touchdown, engagements of the paper's flow sensor."""
     height = -flown["truth", "pos_d_m"]
     contact = flown["truth", "contact_n"] > 0.0
     engaged = flown["flow", "engaged"] > 0.0

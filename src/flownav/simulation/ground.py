@@ -171,7 +171,8 @@ def vortex_ring(
     wind: WindVelocity, state: RecirculationState, sink_m_s: float, across_m_s: float, thrust_n: float,
     p: RecirculationParameters,
 ) -> WindVelocity:  # fmt: skip
-    """The air, and what a rotor that sinks into its own wake pulls down through itself: more than momentum theory has.
+    """The air with the flow that a rotor pulls down through itself as it sinks into its own wake: more than momentum
+    theory has.
 
     sink_m_s: downwards over the ground; the wind's own vertical speed counts. across_m_s: horizontally through the air.
     """

@@ -20,7 +20,7 @@ class Family(NamedTuple):
 
 
 class Inverse(NamedTuple):
-    """A distribution as a campaign asks it; it stands for SciPy's of the same family."""
+    """A distribution as a campaign uses it; it stands for SciPy's of the same family."""
 
     family: Family
     shapes: tuple[float, ...]
@@ -33,7 +33,7 @@ class Inverse(NamedTuple):
         return low * self.scale + self.loc, high * self.scale + self.loc
 
     def ppf(self, shares: Any) -> Any:
-        """The numbers with these shares of the distribution below them; NaN of what is no share."""
+        """The numbers with these shares of the distribution below them; NaN where a number is no share."""
         q = np.asarray(shares, float)
         low, high = self.support()
         inside = (q > 0.0) & (q < 1.0)
@@ -79,7 +79,9 @@ FAMILIES: Mapping[str, Family] = {
 
 
 def inverse_of(name: str, shapes: Mapping[str, float], loc: float, scale: float) -> Inverse | None:
-    """A distribution by SciPy's names; None of another family, and of what the family cannot be: SciPy says why."""
+    """A distribution by SciPy's names; None of another family, and of parameters that the family cannot have, for which
+    SciPy gives the reason.
+    """
     family = FAMILIES.get(name)
     if family is None or sorted(family.shapes) != sorted(shapes):
         return None

@@ -114,12 +114,12 @@ _rows.keep(records.Landed)
 _rows.keep(records.PadPlace)
 _rows.keep(records.AttitudeError)
 HORIZON_ERROR = _rows.keep(records.HorizonError)
-# what the filter says, whichever flies
+# the estimate of the filter that flies
 ESTIMATED = _rows.keep(records.Estimated)
 _rows.keep(records.Spread)
 NEES = _rows.keep(records.Nees)
 # the autopilot
-ESTIMATE = _rows.keep(Estimate)  # what it flies on
+ESTIMATE = _rows.keep(Estimate)  # its feedback
 HOME = _rows.keep(records.Home)
 AUTOPILOT = _rows.keep(AutopilotState)
 # what it learns of the vehicle
@@ -155,7 +155,7 @@ load_stage, store_stage = lane_access(HelicopterState, STAGE)
 load_sum, store_sum = lane_access(HelicopterState, SUM)
 load_multirotor, store_multirotor = lane_access(MultirotorState, HELICOPTER)
 load_multirotor_stage, store_multirotor_stage = lane_access(MultirotorState, STAGE)
-load_roots, store_roots = lane_access(Six, SUM)  # of the shares of thrust that the mixer asks for
+load_roots, store_roots = lane_access(Six, SUM)  # of the shares of thrust that the mixer commands
 load_inflow, store_inflow = lane_access(Inflow, INFLOW)
 load_controls, store_controls = PLANT.access(Controls)
 load_loads, store_loads = PLANT.access(records.Loads)

@@ -1,6 +1,6 @@
-"""The autopilot's learning of its vehicle (`control.learning`) in the loop: stirred, listened to and solved.
+"""The autopilot's learning of its vehicle (`control.learning`) in the loop: stirred, measured and solved.
 
-It is told what the IMU read and what was asked of the cyclics, and nothing of the truth.
+It is given the IMU's readings and the cyclic commands, and nothing of the truth.
 """
 
 from typing import NamedTuple
@@ -38,7 +38,7 @@ from flownav.simulation.records import Estimated, Home
 
 @equation
 def learn(work: Work, lanes: Lanes, epoch: int, gains: AutopilotGains, told: Told | None) -> None:
-    """What an epoch adds, where a vehicle may be learnt."""
+    """Add an epoch to the learning, where a vehicle may be learnt."""
     if told is not None:  # noqa: SIM102  (None is a type here: its code is not compiled)
         if told.begins >= 0 and epoch >= told.begins:
             mind(work, lanes, gains, epoch - told.begins)
@@ -47,7 +47,7 @@ def learn(work: Work, lanes: Lanes, epoch: int, gains: AutopilotGains, told: Tol
 
 
 class Minded(NamedTuple):
-    """What has been learnt so far, and whether the autopilot waits for more."""
+    """Result of learning so far, and whether the autopilot waits for more."""
 
     learnt: Learnt
     autopilot: AutopilotState
@@ -58,7 +58,7 @@ def mind(
     before: Learnt, autopilot: AutopilotState, said: Estimated, home: Home, known: Knowledge, *, gains: AutopilotGains,
     passed: int,
 ) -> Minded:  # fmt: skip
-    """Whether it goes on: in flight, not low, not going around, near the tilt that is asked for; else it waits.
+    """Whether it goes on: in flight, not low, not going around, near the commanded tilt; else it waits.
 
     passed: epochs since it was to begin.
     """
@@ -79,7 +79,7 @@ def mind(
 
 @procedure
 def stir_lane(work: Work, lanes: Lanes, lane: int, told: Told) -> None:
-    """One lane's epoch of the stir. What the last one shows is noted, and what comes next is asked for."""
+    """One lane's epoch of the stir. Note the last one's measurement, and command the next."""
     learnt = layout.load_learnt(work, lanes, lane)
     since = int(learnt.since) - 1
     stir = Stir(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -101,7 +101,7 @@ def stir_lane(work: Work, lanes: Lanes, lane: int, told: Told) -> None:
 
 @equation
 def stir_at(turn: int) -> Stir:
-    """What is added in an epoch of the period: a step of the attitude loop has the middle of its straight piece."""
+    """The stir added in an epoch of the period: a step of the attitude loop has the middle of its straight piece."""
     after = (turn + 1) % STIR_EPOCHS
     lon_step = (STIR[after, 0] - STIR[turn, 0]) / ATTITUDE_STEPS
     lat_step = (STIR[after, 1] - STIR[turn, 1]) / ATTITUDE_STEPS
@@ -110,7 +110,7 @@ def stir_at(turn: int) -> Stir:
 
 @procedure
 def conclude(work: Work, lanes: Lanes, lane: int, told: Told, periods: int) -> None:
-    """What has been learnt in so many periods, and the gains for it; it goes on where it is too unsure."""
+    """Judge the learning after a number of periods and shape the gains by it; it goes on where it is too unsure."""
     before = layout.load_learnt(work, lanes, lane)
     learnt = judged(solved(work, lanes, layout.SPECTRA, layout.LEARNING_SCRATCH, lane, told, periods))
     layout.store_loop_gains(work, lanes, lane, shaped(layout.load_loop_gains(work, lanes, lane), learnt))

@@ -1,7 +1,8 @@
-"""The navigator's turn in each epoch: what is due goes in, its estimate is carried on to now and flown on.
+"""The navigator's turn in each epoch: what is due goes in, its estimate is carried on to now and passed to the
+autopilot.
 
-The simulator writes readings into the rows that the navigator takes them from, and reads what it says; it never
-touches the filter.
+The simulator writes readings into the rows that the navigator takes them from, and reads its estimate; it never touches
+the filter.
 """
 
 from typing import NamedTuple
@@ -184,7 +185,7 @@ def put_on_truth(
 # -- from the horizon to now --------------------------------------------------------------------------------------
 @on_both
 def find_place(place: records.PadPlace, pad: PadSaid, ground: GroundMemory, below: GroundSaid) -> records.PadPlace:
-    """The pad's place by its camera and by the range, where they have told."""
+    """The pad's place by its camera and by the range, where they have found it."""
     found, grounded = pad.known > 0.0, ground.known > 0.0
     return records.PadPlace(
         pad.north_m if found else place.north_m,
@@ -195,7 +196,7 @@ def find_place(place: records.PadPlace, pad: PadSaid, ground: GroundMemory, belo
 
 @procedure
 def carry_ahead(work: Work, nav: Work, lanes: Lanes, heard: int, ahead: int, period_s: float, table: Timetable) -> None:
-    """The estimate of now: the navigator's state moved on by the newest `ahead` inertial readings, of `heard`.
+    """Store the estimate of now: the navigator's state moved on by the newest `ahead` of the `heard` inertial readings.
 
     Position is counted from where the vehicle takes its pad to be: a camera's pad, else what it noted; its height over
     the ground that a range has found.
@@ -212,7 +213,7 @@ def carry_ahead(work: Work, nav: Work, lanes: Lanes, heard: int, ahead: int, per
 
 @equation
 def over_pad(c: Carried, place: records.PadPlace) -> records.Estimated:
-    """The state as it is flown on."""
+    """The state as the autopilot uses it: position over the pad, body velocity and attitude."""
     u, v, w = to_body(rotation_from_quaternion(c.qw, c.qx, c.qy, c.qz), c.vel_n, c.vel_e, c.vel_d)
     return records.Estimated(
         c.pos_n - place.north_m, c.pos_e - place.east_m, c.pos_d - place.down_m, u, v, w, c.qw, c.qx, c.qy, c.qz
@@ -224,13 +225,13 @@ def note_knowledge(
     before: Knowledge, around: Around, pad: PadSaid, variance: PadVariance, ground: GroundMemory,
     suspicion: SuspicionMemory,
 ) -> Knowledge:  # fmt: skip
-    """What the vehicle knows of its landing, by its navigator and its camera, an epoch later."""
+    """Knowledge of the landing, by the vehicle's navigator and its camera, an epoch later."""
     found = pad.known > 0.0
     north = variance.over_n_m2 if found else variance.own_n_m2
     east = variance.over_e_m2 if found else variance.own_e_m2
     sigma_m = np.sqrt(larger(larger(north, east), 0.0)) if np.isfinite(north + east) else np.inf
     unseen_s = before.pad_unseen_s + EPOCH_S
-    powerless_s = before.powerless_s + EPOCH_S if around.engine == 0.0 else 0.0  # as the speed controller tells
+    powerless_s = before.powerless_s + EPOCH_S if around.engine == 0.0 else 0.0  # as the speed controller reports
     return Knowledge(
         1.0 if found else 0.0, ground.known, unseen_s, sigma_m, 1.0 if suspicion.suspected > 0.0 else 0.0, powerless_s
     )
@@ -246,7 +247,7 @@ def keep_inertial(reading: Reading) -> records.InertialThen:
 
 # -- who flies ----------------------------------------------------------------------------------------------------
 class HandedOver(NamedTuple):
-    """What the autopilot flies on, and from where it counts."""
+    """The autopilot's feedback, with the place from which it counts and the error of the attitude."""
 
     place: records.PadPlace
     estimated: records.Estimated
@@ -258,7 +259,8 @@ def hand_to_autopilot(
     state: HelicopterState, start: StartMemory, loads: records.Loads, place: records.PadPlace, said: records.Estimated,
     *, waiting: bool, at_start: bool, reference: Reference,
 ) -> HandedOver:  # fmt: skip
-    """Before the hand-over the vehicle stands where its path begins, or is flown on the truth, and notes its place.
+    """Before the hand-over the vehicle stands where its path begins, or flies with the truth as feedback, and notes its
+    place.
 
     waiting: the hand-over is still to come; at_start: its pad is where its path begins.
     """

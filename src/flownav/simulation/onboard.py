@@ -1,4 +1,4 @@
-"""The sensors that a vehicle carries for its navigator: coefficients, clocks and places, and what they look at.
+"""The sensors that a vehicle carries for its navigator: coefficients, clocks and places, and the ground below.
 
 Last: datasheets as a scenario wants them, its own figures above the files', at rates that the simulator's clock has.
 """
@@ -27,7 +27,7 @@ SETTLED_S = 2.0  # the skids take the weight as the collective goes down: chosen
 
 
 class Clock(NamedTuple):
-    """When a sensor reads: every so many epochs from the first on; fitted: how many readings it then gives, or none."""
+    """When a sensor reads: each `every` epochs from the first on; fitted: how many readings it then gives, or none."""
 
     fitted: int
     every: int
@@ -74,7 +74,9 @@ def without(onboard: Onboard, *names: str) -> Onboard:
 
 @equation
 def earlier(state: HelicopterState, late_s: float) -> HelicopterState:
-    """The state with the position that it had `late_s` ago, at the velocity of now: what a late reading shows."""
+    """The state with the position that it had `late_s` ago, at the velocity of now: the position that a late reading
+    shows.
+    """
     rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
     vel_n, vel_e, vel_d = to_earth(rotation, state.u, state.v, state.w)
     return HelicopterState(
@@ -95,7 +97,7 @@ def place_of(state: HelicopterState, place: Place) -> tuple[float, float, float]
 
 @equation
 def beam_of(state: HelicopterState, place: Place, ground: Ground) -> BeamHit:
-    """What a lens looks at along body down."""
+    """The distance along body down from a lens to the ground, and the point that it hits."""
     rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
     north, east, down = place_of(state, place)
     return beam_distance(north, east, -down, rotation, ground)
@@ -128,7 +130,7 @@ def clock_of(sheet: SensorSheet, phase: int, readings: int) -> Clock:
 
 
 class Wishes(Protocol):
-    """What a scenario says of sensors itself, above their files."""
+    """Sensor settings that a scenario states itself, above the sensors' files."""
 
     @property
     def gps(self) -> GpsInsSettings:
@@ -144,19 +146,21 @@ class Wishes(Protocol):
 
 
 def as_filed(scenario: Wishes, sheet: Sheet, lens_down_m: float) -> Sheet:
-    """What its file says."""
+    """The sheet as its file has it, on the simulator's clock."""
     return on_clock(sheet)
 
 
 def inertial_sheet(scenario: Wishes, sheet: InertialSheet, lens_down_m: float) -> InertialSheet:
-    """The IMU at the lowest rate, not below its own, whose period is so many physics steps that an epoch has."""
+    """The IMU at the lowest rate, not below its own, whose period is a whole number of physics steps that divides an
+    epoch.
+    """
     steps = [n for n in range(1, STEPS_AN_EPOCH + 1) if STEPS_AN_EPOCH % n == 0]
     fast = [n for n in steps if 1.0 / (n * PHYSICS_PERIOD_S) >= float(sheet.rate_hz) - 1e-6]
     return sheet.model_copy(update={"rate_hz": 1.0 / (max(fast or steps[:1]) * PHYSICS_PERIOD_S)})
 
 
 def receiver_sheet(scenario: Wishes, sheet: GpsReceiverSheet, lens_down_m: float) -> GpsReceiverSheet:
-    """The receiver: the paper's white noise at 50 Hz, or the sheet with what the scenario says of its errors."""
+    """The receiver: the paper's white noise at 50 Hz, or the sheet with the scenario's changes to its errors."""
     gps = scenario.gps
     if gps.model == "white":
         white = dict.fromkeys(("slow_sigma_m", "slow_sigma_down_m", "fast_sigma_m", "fast_sigma_down_m", "spread"), 0.0)
@@ -189,7 +193,7 @@ def camera_sheet(scenario: Wishes, sheet: FlowCameraSheet, lens_down_m: float) -
 
 
 def range_sheet(scenario: Wishes, sheet: RangeSensorSheet, lens_down_m: float) -> RangeSensorSheet:
-    """The rangefinder with what the scenario says of it, its lens where the scenario puts it."""
+    """The rangefinder with the scenario's changes, its lens where the scenario puts it."""
     sonar = scenario.rangefinder
     said = {name: getattr(sonar, name) for name in sonar.model_fields_set}
     return on_clock(sheet.model_copy(update=said | {"lens": at_height(sheet.lens, lens_down_m)}))

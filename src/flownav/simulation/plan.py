@@ -1,4 +1,6 @@
-"""What a flight is: the plan, the vehicle, the sensors and the rates of the loop, as numbers that kernels take."""
+"""Description of a flight: the plan, the vehicle, the sensors and the rates of the loop, as numbers that kernels
+take.
+"""
 
 from typing import NamedTuple
 
@@ -39,7 +41,7 @@ class Happens(NamedTuple):
 
 
 class FlightPlan(NamedTuple):
-    """What a scenario asks of the loop, as numbers the kernel takes."""
+    """A scenario's demands on the loop, as numbers that the kernel takes."""
 
     epochs: int
     start: AnyState
@@ -51,7 +53,7 @@ class FlightPlan(NamedTuple):
     minds_faults: bool  # a suspected fault is a reason to go around: the navigator follows what faults would do
     home_at_start: bool  # the pad is where the estimate first puts the start, else at the filter's origin
     start_known: bool  # the paper's filter starts at the true position, else at the first GPS reading
-    handover_s: float  # until then the vehicle is flown on the truth, where it does not stand on its skids
+    handover_s: float  # until then the autopilot uses the truth, where it does not stand on its skids
     happens: Happens
     draws: Draws
 
@@ -59,8 +61,8 @@ class FlightPlan(NamedTuple):
 class OwnParts(NamedTuple):
     """Addresses of C functions that fly in place of ours on one lane, each called with the lane buffer; 0: ours flies.
 
-    step: the vehicle, (work, dt [s]) moves it and says its thrust, ground load and power; dt 0 is the start. steer: the
-    attitude loop, (work) sets the controls of the next ATTITUDE_S.
+    step: the vehicle, (work, dt [s]) moves it and reports its thrust, ground load and power; dt 0 is the start. steer:
+    the attitude loop, (work) sets the controls of the next ATTITUDE_S.
     """
 
     step: int
@@ -91,4 +93,4 @@ class Flight(NamedTuple):
     limits: TouchdownLimits
     fails: bool | None = None  # its sensors may fail, each lane's as its truth has it; None: the code is not compiled
     learns: Told | None = None  # what is believed of a vehicle that may be learnt in hover; None: it is not compiled
-    own: OwnParts | None = None  # vehicle and controller that somebody else wrote (room parts/)
+    own: OwnParts | None = None  # a user's own vehicle and controller (room parts/)

@@ -165,7 +165,7 @@ def observe_balanced(work: Work, lanes: Lanes) -> None:
 
 @equation
 def note_outputs(work: Work, lanes: Lanes, lane: int, seen: Outputs) -> None:
-    """What sensors and scores read of the plant."""
+    """Store the plant's loads, as sensors and scores read them."""
     layout.store_loads(work, lanes, lane, Loads(seen.thrust_n, seen.contact_force_n, seen.power_w))
 
 

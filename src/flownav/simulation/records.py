@@ -1,6 +1,6 @@
-"""What the simulator keeps of each lane beside the states of vehicle, sensors and autopilot, as named records.
+"""Memory of the simulator in each lane beyond the states of vehicle, sensors and autopilot, as named records.
 
-`layout` says where they lie. Position and velocity over the ground are local NED, attitude is body to earth, and
+`layout` holds where they lie. Position and velocity over the ground are local NED, attitude is body to earth, and
 `forward`, `right` and `below` (of velocities u, v, w) are body FRD.
 """
 
@@ -16,7 +16,7 @@ class RotorSpeed(NamedTuple):
 
 
 class Loads(NamedTuple):
-    """What sensors and scores read of the vehicle: the main rotor's thrust, or of all, load on the skids, power."""
+    """The vehicle's loads, for sensors and scores: thrust of the main rotor, or of all; load on the skids; power."""
 
     thrust_n: float
     contact_n: float
@@ -95,7 +95,9 @@ class PaperVariance(Spread):
 
 
 class Felt(NamedTuple):
-    """What the IMU read, body FRD: mean specific force over the epoch so far, the last, and the mean rates p and q."""
+    """Readings of the IMU, body FRD: mean specific force over the epoch so far, the last, and the mean rates p and
+    q.
+    """
 
     mean_x_m_s2: float
     mean_y_m_s2: float
@@ -108,13 +110,13 @@ class Felt(NamedTuple):
 
 
 class Landed(NamedTuple):
-    """What the skid switch says: 1 on the ground."""
+    """State of the skid switch: 1 on the ground."""
 
     landed: float
 
 
 class SeesFlow(NamedTuple):
-    """1 where the last reading of the navigator's camera says anything."""
+    """1 where the last reading of the navigator's camera has data."""
 
     sees: float
 
@@ -130,7 +132,7 @@ class Exposed(NamedTuple):
 
 
 class Late(NamedTuple):
-    """How much older than its datasheet says a sensor's readings are; 0 before the first epoch."""
+    """How much older than by its datasheet a sensor's readings are; 0 before the first epoch."""
 
     late_s: float
 
@@ -157,7 +159,7 @@ class InertialThen(NamedTuple):
 
 
 class PadPlace(NamedTuple):
-    """Where the pad is in the navigator's frame, as far as the vehicle knows."""
+    """Where the pad is in the navigator's frame, by the vehicle's knowledge."""
 
     north_m: float
     east_m: float
@@ -165,7 +167,7 @@ class PadPlace(NamedTuple):
 
 
 class Estimated(NamedTuple):
-    """What the filter says, whichever flies: position over the pad, body velocity and attitude."""
+    """Estimate of whichever filter flies: position over the pad, body velocity and attitude."""
 
     pos_n_m: float
     pos_e_m: float
@@ -180,7 +182,7 @@ class Estimated(NamedTuple):
 
 
 class Nees(NamedTuple):
-    """Its normalised error squared, of position and velocity NED; 0 where the filter does not say."""
+    """Its normalised error squared, of position and velocity NED; 0 where the filter states none."""
 
     nees: float
 
@@ -190,7 +192,7 @@ class HorizonError(Measured):
 
 
 class AttitudeError(NamedTuple):
-    """The rotation from the true attitude to the one that is flown on, earth axes."""
+    """The rotation from the true attitude to the one that the autopilot uses, earth axes."""
 
     w: float
     x: float

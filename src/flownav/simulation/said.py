@@ -1,4 +1,4 @@
-"""What the simulator reads of the navigator, as records of the navigator's buffer, which laws are told as `nav`."""
+"""The simulator's view of the navigator: records of the navigator's buffer, which laws take as `nav`."""
 
 from typing import NamedTuple
 
@@ -41,7 +41,7 @@ class PadVariance(NamedTuple):
 
 @equation
 def stated_variance(nav: Work, lanes: Lanes, lane: int) -> StatedVariance:
-    """What the filter states of its position and body velocity."""
+    """The filter's stated variances of position and body velocity."""
     r = rotation_of(nav, lanes, lane)
     return StatedVariance(
         variance_of(nav, lanes, POSITION, lane),
@@ -55,14 +55,14 @@ def stated_variance(nav: Work, lanes: Lanes, lane: int) -> StatedVariance:
 
 @equation
 def pad_variance(nav: Work, lanes: Lanes, lane: int) -> PadVariance:
-    """What the filter states of its position, and of that over the pad."""
+    """The filter's stated variances of its position, and of that over the pad."""
     north, east = variance_of(nav, lanes, POSITION, lane), variance_of(nav, lanes, POSITION + 1, lane)
     return PadVariance(north, east, north + of_pad(nav, lanes, 0, lane), east + of_pad(nav, lanes, 1, lane))
 
 
 @equation
 def of_pad(nav: Work, lanes: Lanes, axis: int, lane: int) -> float:
-    """What the pad's place adds to the variance of the position over it, along north (0) or east (1)."""
+    """Contribution of the pad's place to the variance of the position over it, along north (0) or east (1) [m2]."""
     beside = covariance_of(nav, lanes, POSITION + axis, PAD + axis, lane)
     pad: float = variance_of(nav, lanes, PAD + axis, lane) - 2.0 * beside
     return pad

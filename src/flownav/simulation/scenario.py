@@ -1,4 +1,4 @@
-"""Scenario files: what is flown, with which vehicle, sensors, wind, filter and autopilot.
+"""Scenario files: the path, vehicle, sensors, wind, filter and autopilot.
 
 `sortie`, `takeoff`, `landing`, `gusty`, `pad_return` and `approach` ship; any TOML file of this schema flies. Positions
 are those of the skids relative to the pad's centre, in the local NED frame.
@@ -35,7 +35,7 @@ class Knot(ParameterModel):
 
 
 class FlightSection(ParameterModel):
-    """What is flown. `start` puts the vehicle on its skids or in trimmed hover at the first knot."""
+    """The flight of a scenario. `start` puts the vehicle on its skids or in trimmed hover at the first knot."""
 
     duration_s: Number = Field(50.0, ge=0.1, le=3600.0)  # simulated time
     start: Literal["ground", "hover"]  # ground: on the skids; hover: in trim, both at the first knot
@@ -85,7 +85,8 @@ class VehicleSection(ParameterModel):
 class FilterSection(ParameterModel):
     """Which filter flies: the navigator's, or the paper's, which starts at the known pad or at the first GPS reading.
 
-    handover_s: a vehicle that starts in hover is flown on the truth so long, while the navigator listens.
+    handover_s: for this long a vehicle that starts in hover flies with the truth as feedback, while the navigator
+    receives readings.
     """
 
     name: Literal["paper", "landing"] = "landing"  # landing: flownav's navigator; paper: the paper's Kalman filter
@@ -150,8 +151,8 @@ _SheetFiles: Any = create_model("_SheetFiles", __base__=ParameterModel, **_files
 class SensorsSection(_SheetFiles):
     """The datasheets of what the vehicle carries for its navigator; the shipped ones unless named.
 
-    `gps`, `rangefinder` and `pad_fix` of the scenario stand above what the sheets say. texture: whether flow finds it
-    everywhere or on the pad alone.
+    `gps`, `rangefinder` and `pad_fix` of the scenario stand above the sheets. texture: whether flow finds it everywhere
+    or on the pad alone.
     """
 
     texture: Literal["everywhere", "pad"] = "everywhere"
@@ -168,14 +169,14 @@ class LearningSection(ParameterModel):
 
 
 class AutopilotSection(ParameterModel):
-    """What the autopilot flies on, where it takes the pad to be, its gains where the vehicle's do not serve, and the
+    """The autopilot's feedback, where it takes the pad to be, its gains where the vehicle's do not serve, and the
     collective on the skids.
 
     home: "start" puts the pad where the estimate first puts the start of the path (a vehicle that returns to where
     it was), "origin" at the filter's origin (a vehicle that comes from elsewhere).
     """
 
-    feedback: Literal["estimate", "truth"] = "estimate"  # what it flies on: the filter's estimate, or the truth
+    feedback: Literal["estimate", "truth"] = "estimate"  # its feedback: the filter's estimate, or the truth
     home: Literal["start", "origin"] = "start"
     position_gain_1_s: Number | None = Field(None, gt=0.0, le=5.0)  # speed per position error; none: the vehicle's
     velocity_gain_1_s: Number | None = Field(None, gt=0.0, le=10.0)  # acceleration per speed error; none: the vehicle's

@@ -1,4 +1,4 @@
-"""What each carried sensor sees of the plant, and what is told of its readings: functions of one lane's records."""
+"""Inputs of each carried sensor from the plant, and the uses of its readings: functions of one lane's records."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -62,7 +62,7 @@ def see_power(loads: Loads) -> float:
 
 
 def see_beam(state: HelicopterState, late: Late, place: onboard.Place, ground: Ground) -> BeamHit:
-    """What a lens looks at along body down, as late as its readings are."""
+    """The point on the ground along body down from a lens, as late as its readings are."""
     return onboard.beam_of(onboard.earlier(state, late.late_s), place, ground)
 
 
@@ -77,7 +77,7 @@ class Looked(NamedTuple):
 
 
 class MeanRates(NamedTuple):
-    """How the vehicle turned while the flow camera exposed, and how its own gyro said that it did [rad/s]."""
+    """How the vehicle turned while the flow camera exposed, and the turning by its own gyro [rad/s]."""
 
     p: float
     q: float
@@ -102,7 +102,7 @@ def see_flow(
     state: HelicopterState, flow: FlowState, sensor: FlowParameters, late: Late, ground: Ground, place: onboard.Place,
     turned: MeanRates, *, s: onboard.Onboard,
 ) -> flow_camera.FlowCameraTruth:  # fmt: skip
-    """What passes under the lens, through the identified dynamics, and the mean rate of the exposure."""
+    """Motion of the ground under the lens, through the identified dynamics, and the mean rate of the exposure."""
     late_s, rotation = late.late_s, attitude_of(state)
     hit = onboard.beam_of(state, place, ground)
     north, east, down = onboard.place_of(state, place)
@@ -164,13 +164,13 @@ def look_for_pad(
 
 
 def note_seen(reading: Reading, known: Knowledge) -> Knowledge:
-    """Whether the camera saw the pad in the frame that it has just told of."""
+    """Whether the camera saw the pad in the frame that has just arrived."""
     return with_unseen(known, pad_unseen_s=0.0 if reading.arrived > 0.0 else known.pad_unseen_s)
 
 
 # -- skid switch --------------------------------------------------------------------------------------------------
 class Touched(NamedTuple):
-    """The switch for the autopilot, and what the vehicle says of it."""
+    """The switch for the autopilot, and the vehicle's report of it."""
 
     state: skid_switch.SkidSwitchState
     landed: Landed
@@ -178,7 +178,7 @@ class Touched(NamedTuple):
 
 
 def see_load(loads: Loads) -> float:
-    """What the skids carry [N]."""
+    """Load on the skids [N]."""
     return loads.contact_n
 
 
@@ -186,7 +186,7 @@ def touch(
     state: skid_switch.SkidSwitchState, unit: skid_switch.SkidSwitchUnit, load_n: float,
     n: skid_switch.SkidSwitchNormals, p: skid_switch.SkidSwitchParameters, autopilot: AutopilotState,
 ) -> Touched:  # fmt: skip
-    """The skid switch, and what the vehicle says of it: on the ground, not about to fly, and settled."""
+    """The skid switch, and the vehicle's report of it: on the ground, not about to fly, and settled."""
     after, read = skid_switch.step_skid_switch(state, unit, load_n, n, p)
     landed = 1.0 if at_rest(read.landed, autopilot) else 0.0
     return Touched(after, Landed(read.landed), with_landed(read, landed=landed))

@@ -74,7 +74,7 @@ def draw_epoch(work: Work, lanes: Lanes, seed: int, flight: int, step: int, draw
 
 @equation
 def true_solution(state: HelicopterState) -> gps_ins.NavSolution:
-    """What a perfect GPS/INS would report."""
+    """Solution of a perfect GPS/INS."""
     rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
     vel_n, vel_e, vel_d = to_earth(rotation, state.u, state.v, state.w)
     return gps_ins.NavSolution(
@@ -97,7 +97,7 @@ def lens_height(state: HelicopterState, cosine: float, lens_below_cg_m: float) -
 
 
 class Integrated(NamedTuple):
-    """What an integrating IMU has over a period, and whence the next one begins."""
+    """Output of an integrating IMU over a period, and the state from which the next one begins."""
 
     truth: ImuReading
     now: Before

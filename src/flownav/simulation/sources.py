@@ -1,6 +1,6 @@
-"""What the noise of a flight is: every standard normal that it draws, by name, and the normals themselves.
+"""Noise of a flight: every standard normal that it draws, by name, and the normals themselves.
 
-For those who ask which noise made a flight what it was; the kernel draws its own.
+For finding which noise decided a flight; the kernel draws its own.
 """
 
 from typing import Any, NamedTuple
@@ -60,7 +60,7 @@ def starts_of(flight: Flight) -> list[Start]:
 
 
 def _units(s: Onboard) -> list[tuple[str, Any, int]]:
-    """The units that the vehicle carries: what each is, and how it starts."""
+    """The units that the vehicle carries: the drawn errors of each, and its start."""
     return [
         (sensor.name, record, rows[sensor.name])
         for sensor in fitted_to(s)

@@ -1,4 +1,4 @@
-"""What surrounds each lane's vehicle in an epoch: the wind at its height, its own wake, the ground under it."""
+"""Surroundings of each lane's vehicle in an epoch: the wind at its height, its own wake, the ground under it."""
 
 from typing import NamedTuple
 
@@ -33,7 +33,7 @@ _over_ground = replacing(Around, *Around._fields[6:19])
 
 
 class Runs(NamedTuple):
-    """What of the vehicle runs, as `Around` has it."""
+    """Running parts of the vehicle, as `Around` has them."""
 
     engine: float
     motor_out: float

@@ -1,8 +1,8 @@
-"""What a flight's vehicle, wind, ground and sensors are, as against what navigator and autopilot believe.
+"""Truth of a flight's vehicle, wind, ground and sensors, as against the belief of navigator and autopilot.
 
 Each flight has a `Truth` of its own, which lies in its lane's rows of the buffer. Where nothing is dispersed
-(*matched*) it is what the datasheets say; of an *ensemble* it is drawn flight by flight (`simulation.ensemble`).
-Its sensors' fault is part of it: what they do wrong, and when.
+(*matched*) it is that of the datasheets; of an *ensemble* it is drawn flight by flight (`simulation.ensemble`). Its
+sensors' fault is part of it, with size and time.
 """
 
 from collections import namedtuple
@@ -36,7 +36,7 @@ class SensorFault(NamedTuple):
     flow: float = 0.0
     range: float = 0.0
     others: float = 0.0  # of no own column here
-    skids: float = 0.0  # the switch, as the navigator hears it; the autopilot has it by wire
+    skids: float = 0.0  # the switch, as the navigator receives it; the autopilot has it by wire
     lost: float = 0.0  # 1: nothing arrives
     m_xx: float = 1.0
     m_xy: float = 0.0
@@ -53,7 +53,7 @@ class SensorFault(NamedTuple):
     noise_first: float = 0.0
     noise_last: float = 0.0
     even_to: float = 0.0  # the first two values are drawn anew, evenly up to this; 0: they are not
-    quality: float = np.nan  # what it says of itself; NaN: as ever
+    quality: float = np.nan  # its own statement; NaN: as ever
     held: float = 0.0  # 1: its first value is that before the fault
     always: float = np.nan  # its first value; NaN: as ever
     spike_share: float = 0.0  # of the readings whose first value is drawn anew, evenly between
@@ -61,7 +61,7 @@ class SensorFault(NamedTuple):
     spike_high: float = 0.0
     blank_s: float = 0.0  # no values for so long, at the start of every
     blank_every_s: float = 1.0
-    late_readings: float = 0.0  # flow says what it said so many readings before
+    late_readings: float = 0.0  # flow repeats its value of this many readings before
 
 
 SOUND = SensorFault()

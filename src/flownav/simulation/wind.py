@@ -40,7 +40,7 @@ from flownav.sensors.processes import gauss_markov, gauss_markov_coefficients
 PERIOD_S = 0.02
 FOOT_M = 0.3048
 ROUGHNESS_M = 0.15 * FOOT_M  # MIL-F-8785C's z0 of the terminal flight phase
-SPAN_M = 1.0  # of a vehicle of which nothing is said: chosen
+SPAN_M = 1.0  # of a vehicle whose span is unknown: chosen
 REFERENCE_SPEED_HEIGHT_M = 20.0 * FOOT_M
 LOWEST_HEIGHT_M = 0.5  # chosen: the model's lengths go to nothing at the ground (its own limit is 10 ft)
 SQRT3 = 1.7320508075688772

@@ -2,8 +2,8 @@
 
 Entries that one cause moves, or that push a loop the same way, move together: a box of fifty dimensions has 10¹⁵
 corners, one of five has 32. What the autopilot's first hover shows anyway (how fast a cyclic turns the body, how much
-collective carries it) is moved alone, on the vehicle as told. Each corner keeps what the file says of every number,
-`uncertainty = 0.6` (either way) or `"0.012..0.025"` (from, to).
+collective carries it) is moved alone, on the nominal vehicle. Each corner keeps the uncertainty that the file states of
+every number, `uncertainty = 0.6` (either way) or `"0.012..0.025"` (from, to).
 """
 
 from collections.abc import Iterator
@@ -69,13 +69,13 @@ class Corner(NamedTuple):
 
 
 def groups_of(file: Any) -> tuple[Groups, Groups]:
-    """What is crossed and what is moved alone of a file's kind."""
+    """Groups that are crossed and groups that are moved alone, of a file's kind."""
     multirotor = isinstance(file, MultirotorFile)
     return (MULTIROTOR_CROSSED, MULTIROTOR_ALONE) if multirotor else (CROSSED, ALONE)
 
 
 def corners(path: Path | None = None) -> Iterator[Corner]:
-    """The vehicle as its file says, then every corner of its box; the shipped vehicle where `path` is None.
+    """The vehicle as its file states it, then every corner of its box; the shipped vehicle where `path` is None.
 
     InputError where the file does not fit its schema, or an uncertainty is no number and no `"from..to"`.
     """

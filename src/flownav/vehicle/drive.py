@@ -77,13 +77,13 @@ class Turning(NamedTuple):
 
 @equation
 def held_turning(loads: RotorLoads) -> Turning:
-    """A rotor that keeps its speed whatever it takes, at an inflow that is told."""
+    """A rotor that keeps its speed whatever it takes, at a given inflow."""
     return Turning(0.0, 0.0, 0.0, loads.torque_n_m)
 
 
 @equation
 def shaft_power(state: HelicopterState, engine: float, vehicle: VehicleParameters) -> float:
-    """What the motor gives to both rotors [W]; engine 0: it is cut."""
+    """Power of the motor to both rotors [W]; engine 0: it is cut."""
     asked = vehicle.governor_w_s_rad * (vehicle.main_speed_rad_s - state.speed) + state.governed
     return engine * clamp(asked, 0.0, vehicle.shaft_power_limit_w)
 

@@ -1,4 +1,4 @@
-"""Refuse a vehicle that cannot be: one line that says which numbers contradict each other.
+"""Refuse a vehicle that cannot be: one line that names the numbers that contradict each other.
 
 Closed forms only (hover by momentum theory and blade elements), so that a bad file is refused at once.
 """

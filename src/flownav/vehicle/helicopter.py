@@ -225,13 +225,13 @@ def derivative(
 
 @equation
 def outputs(state: HelicopterState, around: Around, vehicle: VehicleParameters) -> Outputs:
-    """What the state implies (see Outputs)."""
+    """Outputs of the vehicle in this state (see Outputs)."""
     return outputs_at_inflow(state, inflow_of(state, around, vehicle), around, vehicle)
 
 
 @equation
 def outputs_at_inflow(state: HelicopterState, induced: Inflow, around: Around, vehicle: VehicleParameters) -> Outputs:
-    """What the state implies at given induced velocities."""
+    """Outputs of the vehicle in this state at given induced velocities."""
     rotation = airframe.attitude(state)
     air = airframe.air_motion(state, rotation, around)
     loads = rotor_loads(state, air, blade_angles(state, vehicle), induced, vehicle)

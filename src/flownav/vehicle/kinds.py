@@ -1,4 +1,4 @@
-"""The two kinds of vehicle, and what is asked of either: its file, its parameters, its trim, its rotor.
+"""The two kinds of vehicle, and the functions of either: its file, its parameters, its trim, its rotor.
 
 A file is checked, made flat, and refused where no such vehicle could hover.
 """
@@ -31,7 +31,7 @@ AnyState = HelicopterState | MultirotorState
 
 
 class RotorFacts(NamedTuple):
-    """What the sensors feel of the rotors: speed in hover [rad/s], radius, height above the centre of gravity [m]."""
+    """Facts of the rotors that sensors feel: speed in hover [rad/s], radius, height above the centre of gravity [m]."""
 
     speed_rad_s: float
     radius_m: float
@@ -50,7 +50,7 @@ class Disc(NamedTuple):
 
 
 def schema_of(contents: dict[str, Any], where: str) -> type[VehicleFile] | type[MultirotorFile]:
-    """The schema of a file's contents: a helicopter's where it says no `kind`. InputError where it is unknown."""
+    """The schema of a file's contents: a helicopter's where it has no `kind`. InputError where it is unknown."""
     kind = contents.get("kind")
     if kind is None:
         return VehicleFile
@@ -113,7 +113,7 @@ SHIPPED_NAMES = {"maxi-joker-3": SHIPPED_VEHICLE, "quad-450": "quad_450.toml", "
 
 
 class Entry(NamedTuple):
-    """One number of a vehicle file: dotted key, value in the file's unit, and what the file says of it."""
+    """One number of a vehicle file: dotted key, value in the file's unit, and the file's statement of it."""
 
     key: str
     value: float

@@ -194,7 +194,9 @@ def _linear(rates: Callable[..., Sequence[Any]], about: AnyTrim, kept: list[int]
 
 
 def gust_input(vehicle: AnyVehicle, about: AnyTrim) -> Array:
-    """What wind from the south and from the west (it blows north, east [m/s]) makes of the plant's states, (n, 2)."""
+    """Input matrix of wind from the south and from the west (it blows north, east [m/s]) on the plant's states, (n,
+    2).
+    """
     rates = _rates(vehicle, about, freeze_inflow=False)
     aside = np.array([BESIDE_HOVER_M_S, 0.0])
 

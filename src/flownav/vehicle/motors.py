@@ -88,7 +88,7 @@ def battery_voltage(power_w: float, used_as: float, vehicle: MultirotorParameter
 
 @equation
 def root_of_share(share: float) -> float:
-    """What a share of the full thrust is as a share of the full speed."""
+    """Share of the full speed that gives a share of the full thrust."""
     root: float = np.sqrt(larger(share, LEAST_SHARE))
     return root
 
@@ -108,7 +108,7 @@ def roots_of_shares(x: Six, hexa: bool) -> Six:
 
 @equation
 def told_speed(root: float, voltage_v: float, vehicle: MultirotorParameters) -> float:
-    """The speed that the root of a share asks for [rad/s]; it falls with the battery's voltage."""
+    """The speed for the root of a share [rad/s]; it falls with the battery's voltage."""
     full: float = vehicle.full_speed_rad_s * voltage_v * (1.0 / vehicle.full_v)
     return full * root
 

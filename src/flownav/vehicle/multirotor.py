@@ -162,7 +162,7 @@ def driven(voltage_v: float, motor_out: float) -> Six:
 def derivative_at_roots(
     state: MultirotorState, roots: Six, around: Around, hexa: bool, vehicle: MultirotorParameters
 ) -> MultirotorState:
-    """The rates of the state while the mixer asks each rotor for a share of its full thrust; cut, the motors stop.
+    """The rates of the state while the mixer commands each rotor a share of its full thrust; cut, the motors stop.
 
     roots: `roots_of_shares`.
     """
@@ -215,7 +215,7 @@ def derivative(
 
 @equation
 def outputs(state: MultirotorState, around: Around, hexa: bool, vehicle: MultirotorParameters) -> Outputs:
-    """What the state implies: all rotors' thrust in ground effect, torque on the body, shaft power; feet's force."""
+    """Outputs of the state: all rotors' thrust in ground effect, torque on the body, shaft power; feet's force."""
     rotation = airframe.attitude(state)
     down = (rotation[6], rotation[7], rotation[8])
     air = airframe.air_motion(state, rotation, around)

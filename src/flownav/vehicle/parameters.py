@@ -6,7 +6,7 @@ from typing import NamedTuple
 from flownav.core.parameter_files import in_si, record_of
 from flownav.vehicle.schema import MainRotor, MultirotorFile, TailRotor, VehicleFile
 
-ROTOR_INERTIA = 1.15  # of all that turns with the main rotor, over that of its blades, where a file says none
+ROTOR_INERTIA = 1.15  # of all that turns with the main rotor, over that of its blades, where a file states none
 
 
 class VehicleParameters(NamedTuple):
@@ -98,7 +98,7 @@ class VehicleParameters(NamedTuple):
 
 
 class TouchdownLimits(NamedTuple):
-    """What the vehicle stands when it touches the ground, as the file has it."""
+    """Limits of a touchdown that the vehicle withstands, as the file has them."""
 
     max_sink_rate_m_s: float
     max_lateral_speed_m_s: float
@@ -161,7 +161,7 @@ def _solidity(rotor: MainRotor | TailRotor) -> float:
 
 
 def _rotor(name: str, rotor: MainRotor | TailRotor, speed_rad_s: float, rho: float) -> dict[str, float]:
-    """What is derived of both rotors alike, as `VehicleParameters` has it."""
+    """Parameters derived of both rotors alike, as `VehicleParameters` has them."""
     area, slope, tip = _blade_area_m2(rotor), rotor.lift_slope_per_rad, speed_rad_s * rotor.radius_m
     return {
         f"{name}_tip_speed_m_s": tip,

@@ -183,7 +183,7 @@ def multiplier(hub_height_m: float, airspeed_m_s: float, induced_m_s: float, rad
     """T_IGE/T_OGE = 1 / (1 - (R/4z)² / (1 + (V/v_i)²)) (equation 11), 1.333 at z = R/2 in hover.
 
     z is the height of the rotor hub above ground, not of the vehicle; V the horizontal airspeed; v_i the induced
-    velocity, at least 0.3 m/s. The source image is valid for about 0.5 <= z/R <= 2: below R/2 the value there
-    serves; above 2R the formula runs on (1.0 % at 1.25 diameters, where the paper's text says zero).
+    velocity, at least 0.3 m/s. The source image is valid for about 0.5 <= z/R <= 2: below R/2 the value there serves;
+    above 2R the formula runs on (1.0 % at 1.25 diameters, where the paper's text has zero).
     """
     return multiplier_of_squares(hub_height_m, airspeed_m_s * airspeed_m_s, induced_m_s, radius_m)

@@ -109,10 +109,10 @@ class Actuator(ParameterModel):
 
 
 class Drive(ParameterModel):
-    """What the motor can give to both rotors, what turns with them, and the governor that keeps their speed.
+    """The motor's power for both rotors, the inertia that turns with them, and the governor that keeps their speed.
 
     Gains are shares of the power limit, per rad/s that the main rotor is slow and per rad that it has fallen behind;
-    where a file says none they are Gavrilets' X-Cell's. rotor_inertia 0: from the blades'.
+    where a file states none they are Gavrilets' X-Cell's. rotor_inertia 0: from the blades'.
     """
 
     shaft_power_limit_w: Number = Field(gt=10.0, lt=1e6)  # most that the motor gives to both rotors together
@@ -122,9 +122,9 @@ class Drive(ParameterModel):
 
 
 class Touchdown(ParameterModel):
-    """What the vehicle stands when it touches the ground; beyond any of these it counts as crashed.
+    """Limits that the vehicle withstands when it touches the ground; beyond any of these it counts as crashed.
 
-    Where a file says nothing, the limits are those of a helicopter of the Maxi Joker's size (its file derives them).
+    Where a file states none, the limits are those of a helicopter of the Maxi Joker's size (its file derives them).
     """
 
     max_sink_rate_m_s: Number = Field(2.0, gt=0.0, lt=20.0)  # at first contact

@@ -1,4 +1,4 @@
-"""What there is to know of a vehicle before it flies.
+"""Summary of a vehicle before it flies.
 
 Of a helicopter: trim, linear models beside the paper's, ground effect. Of a multirotor: hover, battery, loads by
 airspeed, ground effect.

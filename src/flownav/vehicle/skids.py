@@ -28,7 +28,7 @@ STICK_TIME_S = 0.010
 
 
 class Support(NamedTuple):
-    """What the feet carry: total normal force [N] and its moments of place Σ N·x, Σ N·y [N m], body axes."""
+    """Load on the feet: total normal force [N] and its moments of place Σ N·x, Σ N·y [N m], body axes."""
 
     normal_n: float
     forward_n_m: float

@@ -11,7 +11,7 @@ from flownav.core.frames import Quaternion, Rotation, Vector, of_unit_length
 
 
 class HelicopterState(NamedTuple):
-    """The helicopter's state; of its rates where a function says so (then every unit is per second).
+    """The helicopter's state; of its rates where a function states so (then every unit is per second).
 
     pos: centre of gravity, earth NED [m], level ground at pos_d = 0. u, v, w: velocity, body FRD [m/s]. qw..qz:
     attitude, body to earth. p, q, r: body rates [rad/s]. a1, b1: flapping, back and right [rad]. lon, lat, col,
@@ -73,7 +73,7 @@ class RotorLoads(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """What the state implies: main rotor thrust in ground effect, torque, shaft power, inflow; skid normal force."""
+    """Outputs of a state: main rotor thrust in ground effect, torque, shaft power, inflow; skid normal force."""
 
     thrust_n: float
     torque_n_m: float
@@ -113,7 +113,7 @@ def normalised(state: HelicopterState) -> HelicopterState:
 
 
 class MultirotorState(NamedTuple):
-    """A multirotor's state; of its rates where a function says so (then every unit is per second).
+    """A multirotor's state; of its rates where a function states so (then every unit is per second).
 
     The first thirteen are those of `state.HelicopterState`, in its order: the sensors look at these alone. speed_1..6:
     the rotors', clockwise from the front right [rad/s], a quad's last two are zero. used: charge taken from the full

@@ -52,7 +52,7 @@ def settled_state(
     pos_d_m: float, vel_body_m_s: Vector, roll: float, pitch: float, a1: float, b1: float, controls: Controls,
     vehicle: VehicleParameters,
 ) -> HelicopterState:  # fmt: skip
-    """A state over the origin, heading north, without rates, its servos where the controls ask them to be.
+    """A state over the origin, heading north, without rates, its servos where the controls put them.
 
     The rotor has its governed speed; its inflow and what the governor gives are still to be found (`with_rotor`).
     """
@@ -74,7 +74,7 @@ def with_rotor(state: HelicopterState, vehicle: VehicleParameters) -> Helicopter
 
 
 def accelerations(rate: HelicopterState) -> tuple[float, ...]:
-    """What a trim makes vanish: the six accelerations and the two flapping rates."""
+    """Derivatives that a trim makes vanish: the six accelerations and the two flapping rates."""
     return (rate.u, rate.v, rate.w, rate.p, rate.q, rate.r, rate.a1, rate.b1)
 
 
@@ -235,7 +235,7 @@ def settled(pos_d_m: float, vel_body_m_s: Vector, roll: float, pitch: float, spe
 
 
 def multirotor_accelerations(rate: MultirotorState, count: int) -> tuple[Any, ...]:
-    """What a trim makes vanish: the six accelerations and the rotors'."""
+    """Derivatives that a trim makes vanish: the six accelerations and the rotors'."""
     spins = (rate.speed_1, rate.speed_2, rate.speed_3, rate.speed_4, rate.speed_5, rate.speed_6)
     return (rate.u, rate.v, rate.w, rate.p, rate.q, rate.r, *spins[:count])
 

@@ -1,1 +1,1 @@
-"""What `flownav.core.compile` is made of; import it from there. With that module, the only code that knows Numba."""
+"""Modules behind `flownav.core.compile`; import from there. With that module, the only code that knows Numba."""

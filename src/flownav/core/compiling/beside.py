@@ -48,7 +48,7 @@ def compile_beside(unit: Unit, kernel: Any, *arguments: Any, whole: str = "") ->
 def begin_beside(module: str, name: str) -> None:
     """Where nothing has ever been compiled, begin on a unit that will be needed before what needs it is imported.
 
-    `compile_beside` takes the process over; it ends with this one where nobody does.
+    `compile_beside` takes the process over; it ends with this process otherwise.
     """
     if STORE.is_empty() and can_pay() and not _begun:
         with suppress(OSError):
@@ -57,7 +57,7 @@ def begin_beside(module: str, name: str) -> None:
 
 @contextmanager
 def meanwhile(work: Callable[[], object]) -> Iterator[None]:
-    """What this process does while it waits for the other one's unit, within the block: what is needed next anyway.
+    """Within the block, run `work` while this process waits for the other one's unit: work that is needed next anyway.
 
     Where nothing is waited for it is not done.
     """

@@ -3,7 +3,7 @@ tables whose rows are such records: where each field stands, the columns by name
 
 LLVM vectorises straight-line code only, so the functions are generated, not looped. A table's record is a NamedTuple
 class over one type variable: its fields are a row's numbers in a kernel and whole columns in Python. A field takes one
-number, or as many as its annotation says: `pos_ned_m: Annotated[Value, 3]`.
+number, or as many as its annotation states: `pos_ned_m: Annotated[Value, 3]`.
 """
 
 import hashlib
@@ -189,7 +189,7 @@ def row_view(record: type) -> Callable[[NDArray[np.float64]], Any]:
 
 @equation
 def row_of(work: Any, lanes: tuple[int, ...], row: int, lane: int) -> float:
-    """What stands in a row of a lane."""
+    """The number in a row of a lane."""
     value: float = work[row * len(lanes) + lane]
     return value
 

@@ -5,8 +5,8 @@ import closure of the kernel's module (`closure.py`), the types of its arguments
 and the versions of the compilers. It begins with a checksum of the rest. Files are looked for first among those that
 a wheel carries, which nobody writes, then in the user's cache (`FLOWNAV_CACHE`, `~/.cache/flownav`).
 
-What is damaged is compiled anew and replaced. A folder that cannot be written, or that somebody else owns or may write
-to (a cache holds code that is run), is not used, which is said in one line on standard error.
+A damaged file is compiled anew and replaced. A folder that cannot be written, or that somebody else owns or may write
+to (a cache holds code that is run), is not used, with one line on standard error.
 """
 
 import hashlib
@@ -74,7 +74,7 @@ class Store:
             return False
 
     def save(self, name: str, payload: bytes) -> None:
-        """Keep these bytes, or say why that cannot be."""
+        """Keep these bytes, or report why that cannot be."""
         if not self._usable:
             return
         try:
@@ -90,12 +90,12 @@ class Store:
             self._give_up(error.strerror or str(error))
 
     def _make(self) -> None:
-        """Make the folder, which nobody else may write to whatever the umask."""
+        """Make the folder, which no other user may write to whatever the umask."""
         self.own.parent.mkdir(parents=True, exist_ok=True)
         self.own.mkdir(OWN_FOLDER, exist_ok=True)
 
     def damaged(self, name: str, why: str) -> None:
-        """Say that a file is damaged; it is compiled anew and replaced."""
+        """Report that a file is damaged; it is compiled anew and replaced."""
         self._tell(f"the cached kernel {name.split('-')[0]} is damaged ({why}): compiling it anew")
 
     def _read(self, path: Path, shipped: bool) -> bytes | None:
@@ -138,7 +138,7 @@ class Store:
 
 
 def _mark_used(path: Path) -> None:
-    """The time of a file tells when it was last used, to the day."""
+    """Set the time of a file to that of its last use, to the day."""
     if time.time() - path.stat().st_mtime > 86400.0:
         os.utime(path)
 
@@ -147,7 +147,9 @@ STORE = Store(cache_folder(), SHIPPED)
 
 
 def depends_also(module: str, laws: Collection[Callable[..., Any]], said: str) -> None:
-    """Whatever is compiled from a module is, in this process, also made of these laws, and of what is said."""
+    """Note that all code compiled from a module is, in this process, also made of these laws, and of the text
+    `said`.
+    """
     generated = " ".join(law.__code__.co_filename for law in laws if law.__code__.co_filename.startswith("<flownav"))
     others = {law.__module__ for law in laws if not law.__code__.co_filename.startswith("<flownav")}
     STORE.sources.extend(module, others, f"{said} {generated}")

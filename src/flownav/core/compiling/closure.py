@@ -1,4 +1,4 @@
-"""What a kernel's machine code depends on: the source of its module and of all that this module imports.
+"""Dependencies of a kernel's machine code: the source of its module and of all that this module imports.
 
 The stamp of a module is a hash over the parsed sources of its *import closure*, comments and docstrings left out:
 a change in a page, in a reader or in a remark compiles nothing. Imports inside functions and under
@@ -37,7 +37,7 @@ WITHOUT_CODE = {
 
 
 class Source(NamedTuple):
-    """What one file contributes: a hash of its code, and the modules that it imports when it is imported."""
+    """Contribution of one file: a hash of its code, and the modules that it imports when it is imported."""
 
     digest: str
     imports: tuple[str, ...]
@@ -55,7 +55,7 @@ class Sources:
         self._seen: dict[str, tuple[tuple[int, int], Source]] = {}
 
     def extend(self, module: str, more: Iterable[str], said: str) -> None:
-        """From now on a module also has in it what these others have, and what is said; in this process only."""
+        """From now on a module also contains these others, and the text `said`; in this process only."""
         text, others = self._more.get(module, ("", frozenset()))
         self._more[module] = f"{text} {said}", others | set(more)
         self._stamps.clear()
@@ -92,7 +92,7 @@ class Sources:
         return self._stamps[wanted]
 
     def _read(self, file: Path, module: str) -> Source:
-        """What a module's file contributes; it is read again when it has changed."""
+        """Contribution of a module's file; it is read again when it has changed."""
         status = os.stat(file)
         state = status.st_mtime_ns, status.st_size
         if self._seen.get(module, (None,))[0] != state:
@@ -124,7 +124,7 @@ class Sources:
 
 
 def _recalled(memory: Path) -> dict[str, Source]:
-    """What an earlier process has written, nothing where that is missing or damaged."""
+    """Sources that an earlier process has written; empty where the file is missing or damaged."""
     try:
         if distrusted(memory.stat()):
             return {}

@@ -1,4 +1,4 @@
-"""What compiles equations, kernels and units: Numba, with our target, our passes and our cache."""
+"""The compiler of equations, kernels and units: Numba, with our target, our passes and our cache."""
 
 from collections.abc import Callable
 from typing import Any, cast
@@ -55,7 +55,7 @@ def called(function: Callable[..., Any]) -> None:
 
 
 class Dispatcher(CPUDispatcher):
-    """Numba's dispatcher with our target and our cache, which says what it compiles."""
+    """Numba's dispatcher with our target and our cache, which reports the function that it compiles."""
 
     def __init__(self, py_func: Callable[..., Any]) -> None:
         super().__init__(py_func, targetoptions=dict(ENTRY))
@@ -72,7 +72,7 @@ class Dispatcher(CPUDispatcher):
 
 
 class _KernelCompiler(_FunctionCompiler):  # type: ignore[misc]
-    """Numba's compiler of one function, which says that it is at work."""
+    """Numba's compiler of one function, which reports that it is at work."""
 
     def _compile_core(self, args: Any, return_type: Any) -> Any:
         with compiling(self.py_func.__name__):

@@ -1,7 +1,7 @@
-"""What the compiler must be told of equations, kept until something is compiled: kernels that are kept need none of it.
+"""Declarations of equations to the compiler, kept until something is compiled: cached kernels need none of them.
 
-Numba takes a third of a second to import, and as long again to be told of a thousand equations. A process that only
-runs what was compiled before never does either (`loaded`). One that has Numba already tells it at once, so that
+Numba takes a third of a second to import, and as long again to take in a thousand equations. A process that only runs
+what was compiled before never does either (`loaded`). One that has Numba already declares them at once, so that
 functions compiled by Numba itself can call equations.
 """
 
@@ -27,7 +27,7 @@ def when_compiling(declare: Callable[[], object]) -> None:
 
 
 def begin_compiling() -> None:
-    """Import the compiler and tell it all that it must know; from then on it is told at once."""
+    """Import the compiler and declare all equations to it; from then on each new one is declared at once."""
     global _begun
     with _lock:
         if not _begun:

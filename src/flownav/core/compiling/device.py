@@ -83,7 +83,7 @@ def _device_named(capability: tuple[int, int, str]) -> Iterator[None]:
 
 
 class _Taught:
-    """What numba-cuda knows already: equations as device functions, which must be kept alive."""
+    """Equations that numba-cuda knows already as device functions, which must be kept alive."""
 
     functions: dict[Callable[..., Any], Any] = {}  # noqa: RUF012
 
@@ -123,7 +123,7 @@ def _say(context: Any, function: Callable[..., Any], kind: Any) -> None:
 
 @cache
 def _teach_once() -> None:
-    """What numba-cuda lacks of NumPy's scalar functions, and pointers with a stride."""
+    """Teach numba-cuda the scalar functions of NumPy that it lacks, and pointers with a stride."""
     import math
 
     import numpy as np

@@ -253,7 +253,7 @@ def exp(x: float) -> float:
 
 @equation
 def inverse_part(near: float, rest: float, whole: float) -> float:
-    """What e^-x is of e^x = (near + rest) * 2^whole, in units of 2^whole; less than counts is held."""
+    """e^-x from e^x = (near + rest) * 2^whole, in units of 2^whole; a smaller value than counts is limited."""
     return power_of_two(-2.0 * (30.0 if whole > 30.0 else whole)) / (near + rest)
 
 

@@ -38,7 +38,7 @@ def stands_for(law: Callable[..., Any], function: Function) -> Function:
 
 
 def spelled(function: Function, how: str, *told: Any) -> Function:
-    """A function that kernels get as instructions, which `how` of the module `spelled` writes, told this much."""
+    """A function that kernels get as instructions, which `how` of the module `spelled` writes, called with `told`."""
     EQUATIONS[function] = True  # another target's compiler compiles the Python function
     _tell("spelled", how, function, *told)
     return function
@@ -57,12 +57,12 @@ def kernel(function: Function) -> Function:
 
 
 def _tell(module: str, how: str, *told: Any) -> None:
-    """Tell Numba, before anything is compiled, by a function of one of the modules that have it."""
+    """Declare to Numba, before anything is compiled, by a function of one of the modules that have it."""
     when_compiling(lambda: getattr(import_module(f"flownav.core.compiling.{module}"), how)(*told))
 
 
 def compiler() -> Any:
-    """The module that has Numba, told of every equation."""
+    """The module that has Numba, with every equation declared."""
     begin_compiling()
     return import_module("flownav.core.compiling.compiler")
 
@@ -127,7 +127,7 @@ class Kernel:
         return file is None or not STORE.holds(file)
 
     def _entry(self, kinds: str, arguments: tuple[Any, ...]) -> Callable[..., Any]:
-        """What runs such arguments: machine code that was kept, or Numba's dispatcher once it has compiled it."""
+        """Entry for such arguments: cached machine code, or Numba's dispatcher once it has compiled the function."""
         entry: Callable[..., Any] | None = python_function(file_name(self.py_func, {}, kinds))
         if entry is None:
             self.dispatcher.prepare(*arguments)
@@ -137,7 +137,7 @@ class Kernel:
 
 
 def sparingly(kernel: Callable[..., Any], steps: int, *arguments: Any) -> Any:
-    """What a kernel returns; a few times from Python, the same bytes, where it would be compiled for few steps."""
+    """Result of a kernel; for few steps from Python, the same bytes, where it would have to be compiled."""
     if steps > FEW_STEPS or not isinstance(kernel, Kernel) or not kernel.spare(*arguments):
         return kernel(*arguments)
     with np.errstate(all="ignore"):

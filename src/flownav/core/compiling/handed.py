@@ -1,9 +1,9 @@
-"""Records that a compiled function hands to another as one argument, in place of one for each number in them.
+"""Records that a compiled function passes to another as one argument, in place of one for each number in them.
 
 A flight is 900 numbers. Numba takes a tuple apart at every call and puts it together in the function that is called,
 which is most of the text that LLVM is given; LLVM takes values of whole structures and does the same by itself, where
-it must. How a tuple is handed over belongs to its type, so it holds for every function of the process, also for one
-that Numba compiles by itself; tuples of other packages, whose code may lie in a cache of theirs, stay as they are.
+it must. How a tuple is passed belongs to its type, so it holds for every function of the process, also for one that
+Numba compiles by itself; tuples of other packages, whose code may lie in a cache of theirs, stay as they are.
 """
 
 from typing import Any
@@ -16,7 +16,7 @@ OURS = "flownav."
 
 
 class _Whole:
-    """What a model of a tuple says of arguments: they are the value itself."""
+    """Arguments of a tuple's model: the value itself."""
 
     def get_argument_type(self: Any) -> Any:
         return self.get_value_type()

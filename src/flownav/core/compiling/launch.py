@@ -1,9 +1,9 @@
 """Functions of one thread, run by many: on a CUDA device, or in Numba's simulator of one.
 
-A function takes the number of its thread and how many threads there are, then what it is told: numbers, arrays and
-named tuples of them. `Gpu` compiles it once for the device at hand, keeps the machine code in the cache of kernels,
-and hands over arguments as the code takes them, field by field (`flattened`). `Simulator` runs the Python function, a
-thread at a time, where NUMBA_ENABLE_CUDASIM=1.
+A function takes the number of its thread and how many threads there are, then its arguments: numbers, arrays and named
+tuples of them. `Gpu` compiles it once for the device at hand, keeps the machine code in the cache of kernels, and
+passes arguments as the code takes them, field by field (`flattened`). `Simulator` runs the Python function, a thread at
+a time, where NUMBA_ENABLE_CUDASIM=1.
 """
 
 import hashlib
@@ -44,7 +44,7 @@ def per_thread(function: Callable[..., None], constants: Constants) -> Callable[
 
 
 def told_names(function: Callable[..., None], constants: Constants) -> list[str]:
-    """The parameters of a function of one thread that its caller tells, in order."""
+    """The parameters of a function of one thread that its caller passes, in order."""
     return [name for name in list(inspect.signature(function).parameters)[2:] if name not in constants]
 
 
@@ -173,7 +173,7 @@ class Simulator:
         return with_arrays(value, np.copy)
 
     def new(self, shape: tuple[int, ...], dtype: Any) -> Any:
-        """A new array, full of what nobody should read."""
+        """A new array, filled with poison values."""
         return np.full(shape, np.nan if np.issubdtype(dtype, np.floating) else 77, dtype)
 
     def fetch(self, array: Any) -> Any:

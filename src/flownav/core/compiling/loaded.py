@@ -1,9 +1,9 @@
 """Machine code that was kept, run without the compiler: LLVM links it to Numba's runtime, three small C libraries.
 
-`import numba` takes a third of a second, and telling it of all equations as long again; this takes a twentieth of one.
-The C libraries (what takes an array out of a Python object, what raises an error) are loaded from Numba's folder under
-Numba's own names, so that Numba finds them should something be compiled after all. Whatever is not as this supposes
-(another version, another system) is left to Numba, which loads the same machine code.
+`import numba` takes a third of a second, and declaring all equations to it as long again; this takes a twentieth of
+one. The C libraries (what takes an array out of a Python object, what raises an error) are loaded from Numba's folder
+under Numba's own names, so that Numba finds them should something be compiled after all. Whatever is not as this
+supposes (another version, another system) is left to Numba, which loads the same machine code.
 """
 
 import builtins
@@ -30,7 +30,9 @@ _lock = threading.RLock()
 
 
 class Environment(NamedTuple):
-    """What code needs of Python: the symbol that points to it, the module whose names it knows, and constants."""
+    """The Python objects that code needs: the symbol that points to it, the module whose names it knows, and
+    constants.
+    """
 
     symbol: str
     module: str
@@ -51,7 +53,7 @@ class MachineCode(NamedTuple):
     compiled: bytes
 
     def unpickled(self) -> Any:
-        """What Numba knows of it: its library without the machine code, its description, and so on."""
+        """Numba's view of it: its library without the machine code, its description, and so on."""
         return pickle.loads(self.compiled)
 
 
@@ -81,7 +83,7 @@ _alive: list[Any] = []  # linked code, and what it points to
 
 
 def kept(name: str | None) -> MachineCode | None:
-    """What is kept under a name, None where there is nothing sound."""
+    """The machine code cached under a name, None where there is nothing sound."""
     payload = STORE.load(name) if name is not None else None
     if name is None or payload is None:
         return None
@@ -105,7 +107,7 @@ def c_function(name: str | None) -> int | None:
 
 
 def _or_none(load: Callable[[], Any]) -> Any:
-    """What is loaded; None where the runtime is not what this module supposes."""
+    """The result of `load`; None where the runtime is not the one that this module supposes."""
     with _lock:
         try:
             return load() if sys.platform == "linux" else None

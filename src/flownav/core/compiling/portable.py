@@ -71,7 +71,7 @@ def process_triple() -> str:
 
 
 class NoProcessorError(Exception):
-    """LLVM knows no such processor; what it says."""
+    """LLVM knows no such processor; the message is LLVM's own."""
 
 
 # -- the code before any processor ----------------------------------------------------------------------------
@@ -243,7 +243,7 @@ class Loaded:
         self._engine.finalize_object()
 
     def function(self, symbol: str, pointers: int) -> Any:
-        """What Python calls, on addresses."""
+        """The function that Python calls, on addresses."""
         kind = ctypes.CFUNCTYPE(ctypes.c_int32, *[ctypes.c_void_p] * pointers)
         return kind(self._engine.get_function_address(symbol))
 
@@ -266,7 +266,7 @@ def prepared(raw: str, processor: Processor, without: Iterable[str], apart: Iter
     text = raw.replace("declare double @sqrt(double)", "declare double @llvm.sqrt.f64(double)")
     text = text.replace("@sqrt(", "@llvm.sqrt.f64(")
     text = re.sub(r"^(define [^\n]*?)(?: #\d+)? \{$", r"\1 #777 {", text, flags=re.M)
-    text = re.sub(r"^  store ptr @\.const\.picklebuf\S*, ptr %\S+.*\n", "", text, flags=re.M)  # errors nobody reads
+    text = re.sub(r"^  store ptr @\.const\.picklebuf\S*, ptr %\S+.*\n", "", text, flags=re.M)  # unread errors
     text += '\nattributes #777 = { nounwind "no-builtins" }\n'
     for name in without:
         text = _changed(text, name, "\\1 #777 {\n  ret i32 0\n}")
@@ -291,7 +291,7 @@ CALL = re.compile(r"call [^\n]*?@(\"[^\"]*\"|[^\s(]+)\(")
 def _without_wide_numbers(text: str) -> str:
     """Whole numbers of 32 bits in place of 64: counts and places, of which none is larger.
 
-    Functions that look at the bits of a float keep them, and so do those that hand such bits to each other.
+    Functions that look at the bits of a float keep them, and so do those that pass such bits to each other.
     """
     bodies = {found.group(1): found.group(0) for found in FUNCTION.finditer(text)}
     handing = {name for name, body in bodies.items() if "i64" in body[: body.index("\n")]}

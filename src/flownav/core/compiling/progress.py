@@ -1,4 +1,4 @@
-"""What is being compiled, and for how long: said on standard error, at least every second on a terminal."""
+"""Progress of compilation, with its name and time: written on standard error, at least every second on a terminal."""
 
 import sys
 import threading
@@ -10,7 +10,7 @@ EVERY_S = 0.5
 
 
 class Progress:
-    """News of compilation, for as long as somebody has asked for them (`announce`)."""
+    """Reports of compilation, while a block asks for them (`announce`)."""
 
     def __init__(self) -> None:
         self._lock = threading.RLock()
@@ -27,7 +27,7 @@ class Progress:
 
     @contextmanager
     def announce(self, what: str, *, throughout: bool = False) -> Iterator[None]:
-        """Tell of compilation inside the block; say nothing where all is in the cache.
+        """Report compilation inside the block; write nothing where all is in the cache.
 
         throughout: a whole run, in which blocks within have their own names and sums.
         """
@@ -51,7 +51,7 @@ class Progress:
 
     @contextmanager
     def expect(self, parts: int, whole: str = "") -> Iterator[None]:
-        """Say of each of so many parts which it is. whole: what they are together, said in place of their names."""
+        """Report each of `parts` parts by name. whole: their common name, written in place of theirs."""
         before, self._expected, self._whole = self._expected, self._done + parts, whole
         try:
             yield

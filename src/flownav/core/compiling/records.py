@@ -1,9 +1,9 @@
 """Records in a lane buffer, and scalar functions of records made to run on lanes.
 
-A `Layout` says where named tuples lie in a lane buffer. A function of records, decorated with `layout.on_lanes`, is
+A `Layout` assigns named tuples their rows in a lane buffer. A function of records, decorated with `layout.on_lanes`, is
 written without rows, lanes or loops: it takes the records that its parameters are annotated with, and returns those
 that it changes. From the annotations the loop is generated that loads each lane's records, calls the function, and
-stores what it returns; straight-line code, which LLVM vectorises. What a function says beside its memory (an offer to
+stores what it returns; straight-line code, which LLVM vectorises. A result of a function beyond its memory (an offer to
 the filter, an event, a state to reset) is a record that some procedure takes: its sink.
 """
 
@@ -31,7 +31,7 @@ class OnLanes(Protocol):
 
 
 class _Kept(NamedTuple):
-    """How a record is loaded and stored. told: what its access is told, which of several it is perhaps; buffer: the
+    """How a record is loaded and stored. told: arguments of its access, such as which of several it is; buffer: the
     name of the lane buffer in which it lies.
     """
 
@@ -42,7 +42,7 @@ class _Kept(NamedTuple):
 
 
 class _Sink(NamedTuple):
-    """A procedure that takes a record of one lane, and what it must be told besides."""
+    """A procedure that takes a record of one lane, and the further arguments that it needs."""
 
     take: Callable[..., Any]
     needs: tuple[str, ...]
@@ -65,7 +65,7 @@ class Layout:
         return first
 
     def keep(self, record: Any, count: int = 1, index: str = "") -> int:
-        """The first of new rows for a record, or for `count` of them, told apart by a number of the name `index`.
+        """The first of new rows for a record, or for `count` of them, distinguished by a number of the name `index`.
 
         Before anything is stored a field has its default, or 0.
         """
@@ -88,23 +88,25 @@ class Layout:
         self._kept[record] = _Kept(found, None, told)
 
     def see(self, law: Callable[..., Any]) -> None:
-        """A record that is not stored: what a law returns of other records of this layout, and of what it is told."""
+        """A record that is not stored: the result of a law of other records of this layout, and of the law's
+        arguments.
+        """
         plan = _Plan(self, law)
         passed = plan.passed(law)
         source = f"def found({', '.join(['work', 'lanes', *plan.told, 'lane'])}):\n    return law({passed})\n"
         self.derive(get_type_hints(law)["return"], equation(write_function("found", source, plan.scope)), *plan.told)
 
     def anywhere(self, record: Any, row: str) -> tuple[Callable[..., Any], Callable[..., Any]]:
-        """A record whose first row the caller tells by the name `row`; its access, `load(work, lanes, row, lane)`."""
+        """A record whose first row the caller passes by the name `row`; its access, `load(work, lanes, row, lane)`."""
         self._kept[record] = _Kept(*lane_access(record, None), (row,))
         return self.access(record)
 
     def beside(self, layout: Layout, buffer: str) -> None:
-        """The records of another buffer are known too; the caller tells that buffer by the name `buffer`."""
+        """The records of another buffer are known too; the caller passes that buffer by the name `buffer`."""
         self._kept.update({record: kept._replace(buffer=buffer) for record, kept in layout._kept.items()})
 
     def sink(self, record: Any, take: Callable[..., Any], *needs: str) -> None:
-        """A record that is not stored: `take(work, lanes, lane, value, *needs)` does what it says."""
+        """A record that is not stored: `take(work, lanes, lane, value, *needs)` carries it out."""
         self._sinks[record] = _Sink(take, needs)
 
     def access(self, record: Any) -> tuple[Callable[..., Any], Callable[..., Any]]:
@@ -128,7 +130,7 @@ class Layout:
         """A function of one lane's records made a procedure on all lanes.
 
         Its positional parameters are annotated with records of this layout, or with named tuples of them; its
-        keyword-only ones are told by the caller, the same for all lanes, as are an index and what sinks need:
+        keyword-only ones are passed by the caller, the same for all lanes, as are an index and the arguments of sinks:
         `run(work, lanes, t_s, *others, o)`, the others as the function has them, then other buffers and indices. It
         returns a record, or a tuple or a named tuple of records, of truths and of such tuples.
         """
@@ -160,7 +162,7 @@ def _several(record: Any, first: int) -> tuple[Callable[..., Any], Callable[...,
 
 # -- from annotations to source -------------------------------------------------------------------------------
 class _Plan:
-    """The source of one generated loop, as it grows: what it is told, and what its text names."""
+    """The source of one generated loop, as it grows: its arguments, and the names in its text."""
 
     def __init__(self, layout: Layout, function: Callable[..., Any]) -> None:
         self.layout, self.name = layout, function.__name__
@@ -169,7 +171,7 @@ class _Plan:
         self.truths: list[str] = []
 
     def also(self, names: tuple[str, ...]) -> str:
-        """These names among what the loop is told; as arguments of a call, each followed by a comma."""
+        """Add these names to the loop's arguments; return them as arguments of a call, each followed by a comma."""
         self.told += [name for name in names if name not in self.told]
         return "".join(f"{name}, " for name in names)
 
@@ -188,7 +190,7 @@ class _Plan:
         return f"{self.known(kept.load)}({self.place(kept)})"
 
     def passed(self, function: Callable[..., Any]) -> str:
-        """What the law is called with, in one lane."""
+        """Arguments of the law's call, in one lane."""
         kinds = get_type_hints(function)
         return ", ".join(
             p.name if p.kind is p.KEYWORD_ONLY else self.loaded(kinds[p.name], p.name) for p in parameters(function)
@@ -200,7 +202,7 @@ class _Plan:
         return f"{buffer}lanes, {self.also(kept.told)}lane"
 
     def put(self, kind: Any, value: str) -> list[str]:
-        """Lines that store what was returned, or hand it to its sink."""
+        """Lines that store what was returned, or pass it to its sink."""
         if kind is bool:
             self.truths.append(f"any{len(self.truths)}")
             return [f"{self.truths[-1]} = {self.truths[-1]} or {value}"]

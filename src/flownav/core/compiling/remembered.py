@@ -91,7 +91,7 @@ def _collect(value: Any, found: list[Any]) -> None:
 
 
 def _renamed(states: Any, block: Any, handler: Any) -> Iterator[Any]:
-    """What becomes of each statement of a block; Numba also puts every one of them into words for a log."""
+    """Results of each statement of a block; Numba also puts every one of them into words for a log."""
     for statement in block.body:
         yield (handler.on_assign if isinstance(statement, ir.Assign) else handler.on_other)(states, statement)
 
@@ -133,7 +133,7 @@ def _defaults(config: Hashable) -> dict[str, Any]:
 
 
 def _no_timer(*_: Any) -> Any:
-    """Numba times its locks at every call of LLVM, for a note on each kernel that nobody reads."""
+    """Numba times its locks at every call of LLVM, for a note on each kernel that is never read."""
     return nullcontext()
 
 

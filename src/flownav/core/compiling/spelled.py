@@ -16,7 +16,9 @@ from numba.extending import lower_builtin
 
 
 def load_spelled(function: Callable[..., Any], bundle: type, rows: tuple[int, ...] | None) -> Callable[..., Any]:
-    """`load(work, lanes, lane)` of the generated Python function; rows None: the first is told, before the lane."""
+    """`load(work, lanes, lane)` of the generated Python function; rows None: the first is an argument, before the
+    lane.
+    """
     fields: tuple[str, ...] = bundle._fields  # type: ignore[attr-defined]
     kind = types.BaseTuple.from_types((types.float64,) * len(fields), bundle)
 
@@ -47,7 +49,7 @@ def store_spelled(function: Callable[..., Any], bundle: type, rows: tuple[int, .
         for i, place in enumerate(at):
             if i < len(kinds):
                 number = context.cast(builder, builder.extract_value(args[-1], i), kinds[i], types.float64)
-            else:  # Numba makes a named tuple of what it is told: the rest is by default
+            else:  # Numba makes a named tuple of the given numbers: the rest is by default
                 number = context.get_constant(types.float64, defaults[fields[i]])
             builder.store(number, place)
         return context.get_dummy_value()

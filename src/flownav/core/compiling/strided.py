@@ -57,7 +57,7 @@ def teach_strided_pointers() -> None:
 
 
 def _teach_types(kind: Any) -> None:
-    """What `strided` gives, and what is read from it and written to it."""
+    """Declare the type that `strided` gives, and reading and writing through it."""
     import operator
 
     from numba.core import types

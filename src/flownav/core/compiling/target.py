@@ -1,4 +1,4 @@
-"""What machine code is made for, and how: a processor level, and one optimisation instead of one per function.
+"""Target of machine code: a processor level, and one optimisation instead of one per function.
 
 Numba optimises every function it compiles and emits machine code for it, and does both again in each caller. For the
 functions that only kernels call this is waste. Inside `lean()`
@@ -206,7 +206,7 @@ class LeanCodegen(JITCPUCodegen):
 
 
 def is_lean() -> bool:
-    """Whether this version of Numba is built as `LeanLibrary` supposes; `FLOWNAV_PLAIN=1` says no."""
+    """Whether this version of Numba is built as `LeanLibrary` supposes; False with `FLOWNAV_PLAIN=1`."""
     parts = ("_finalize_final_module", "_raise_if_finalized", "_get_module_for_linking", "_optimize_functions")
     return Leanness.wanted and all(hasattr(JITCodeLibrary, part) for part in parts)
 

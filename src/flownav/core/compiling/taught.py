@@ -1,5 +1,5 @@
-"""What Numba is taught before it compiles anything of ours: records as arguments, kernels that call kernels, pointers,
-calls through addresses, the bits of a float.
+"""Numba's lessons before it compiles anything of ours: records as arguments, kernels that call kernels, pointers, calls
+through addresses, the bits of a float.
 """
 
 from typing import Any

@@ -98,7 +98,7 @@ def unit(function: Callable[..., Any], signature: str, **constants: Any) -> Unit
 
 
 def _passed(letter: str, argument: Any) -> Any:
-    """An argument as ctypes takes it; an array must be what the letter says."""
+    """An argument as ctypes takes it; an array must be of the letter's type."""
     dtype = LETTERS[letter][1]
     if dtype is not None and isinstance(argument, np.ndarray):
         if argument.dtype != dtype or not argument.flags.c_contiguous:

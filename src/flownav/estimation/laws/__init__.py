@@ -1,6 +1,6 @@
-"""What each sensor measures, as a law over named states: its prediction and its Jacobian, a file a sensor.
+"""Observation laws of each sensor over named states: its prediction and its Jacobian, a file a sensor.
 
-Here stands what the laws share: body axes in the earth frame, levers, the distance to level ground.
+Here stands the code that the laws share: body axes in the earth frame, levers, the distance to level ground.
 """
 
 from flownav.core.compile import equation, larger

@@ -54,8 +54,8 @@ def flow_rate(
 
     k b is what the gyro that took the rotation off has left there: its bias b, k = `gyro_share`.
 
-    PX4's convention. u and v are the lens's velocity along body forward and right, R_BE v + w x l with the lever
-    l = (forward, right, below), body FRD (0 where no gyro tells w); r is the distance along body down from a lens
+    PX4's convention. u and v are the lens's velocity along body forward and right, R_BE v + w x l with the lever l =
+    (forward, right, below), body FRD (0 where no gyro measures w); r is the distance along body down from a lens
     `lens_below_m` below the IMU to level ground.
     """
     rotation = rotation_by(q)

@@ -49,7 +49,7 @@ def gps_velocity(
     axis: int, vel: float, gps_velocity: float, velocity_lag: float, force: float, q: Attitude, rate: BodyRate,
     *, lever: Lever,
 ) -> tuple[float, OnVelocity]:  # fmt: skip
-    """z = v + R (w x l) + error - lag a [m/s]: receivers smooth their velocity, so that it is older than they say.
+    """z = v + R (w x l) + error - lag a [m/s]: receivers smooth their velocity, so that it is older than they state.
 
     `a` is the acceleration of the last step and w the body rate in it. Their own errors, times the lag and the lever,
     are left out of the Jacobian.

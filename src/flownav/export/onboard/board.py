@@ -1,4 +1,6 @@
-"""The library's own code run here, compiled for this process: what a board or a browser must say is what this says."""
+"""The library's own code run here, compiled for this process: the output of a board or a browser must equal this
+one's.
+"""
 
 from typing import NamedTuple
 
@@ -13,7 +15,7 @@ from flownav.navigation.rows import EVENT_COLUMNS, INNOVATION_COLUMNS
 
 
 class Outcome(NamedTuple):
-    """What became of a call: the numbers of `onboard.OutcomeHead`, and rows of innovations and of events."""
+    """Outcome of a call: the numbers of `onboard.OutcomeHead`, and rows of innovations and of events."""
 
     head: onboard.OutcomeHead[float]
     innovation: Array

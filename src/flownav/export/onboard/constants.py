@@ -54,7 +54,7 @@ def _braced(record: Any, settings: Array, at: int) -> tuple[str, int]:
 
 
 def digests_of(given: Sequence[Given], board: Board, every: int = VECTORS_A_DIGEST) -> Iterator[int]:
-    """The digest after every so many readings."""
+    """The digest after every `every` readings."""
     for count, reading in enumerate(given, 1):
         board.take(reading)
         if count % every == 0:

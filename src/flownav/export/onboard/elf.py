@@ -60,12 +60,12 @@ class Object(NamedTuple):
 
     @property
     def exported(self) -> list[Symbol]:
-        """What callers see."""
+        """Symbols that callers see."""
         return [symbol for symbol in self.symbols if symbol.binding == 1 and symbol.section]
 
     @property
     def missing(self) -> list[str]:
-        """What it names and does not hold."""
+        """Names of symbols that it uses and does not contain."""
         return [symbol.name for symbol in self.symbols if symbol.name and not symbol.section]
 
     @property
@@ -213,8 +213,8 @@ def _fill_in_thumb_move(content: bytearray, at: int, target: int, *, high: bool)
 
 # -- a shared object ------------------------------------------------------------------------------------------
 class _Part(NamedTuple):
-    """A section of a shared object: name, type, flags, bytes, alignment, the section it is about, what it says of
-    itself (how many symbols are local), size of an entry.
+    """A section of a shared object: name, type, flags, bytes, alignment, the section it is about, its info field (how
+    many symbols are local), size of an entry.
     """
 
     name: str

@@ -23,7 +23,7 @@ from flownav.navigation.tape import EVENT_NAMES
 ABI = 1  # of structs and functions; another one does not link, since it is in the functions' names
 SYMBOLS = {name: f"flownav_abi{ABI}_{name}" for name in ("begin", "take", "now", "digest")}
 BEFORE = 1.5  # exposures before the instant that a flow reading describes, its middle: from two before its end on
-SPARE = 5  # rows more: one at each end, and readings that come a little sooner than their rate says
+SPARE = 5  # rows more: one at each end, and readings that come a little sooner than by their rate
 WORDS = {  # where a record's own words are of Python
     "status": "see enum flownav_now_status; the rest stands only where it is FLOWNAV_TOLD",
     "aid": "0: something horizontal was fused lately; 1: dead reckoning; 2: the position is invalid",
@@ -40,8 +40,8 @@ OURS = {  # what Python's words for them are in C
 
 
 class Rates(NamedTuple):
-    """What rings have room for: a horizon [s]; readings a second of the IMU, of all others together, and of an attitude
-    that is told where no IMU serves; the longest exposure of a flow sensor [s], whose turning is to be found.
+    """Capacity of the rings: a horizon [s]; readings a second of the IMU, of all others together, and of an external
+    attitude where no IMU serves; the longest exposure of a flow sensor [s], whose turning is to be found.
     """
 
     horizon_s: float = 0.27
@@ -104,7 +104,7 @@ def settings_structs() -> str:
     sigma = f"  double start_sigma[{STATES}];  /* standard deviations of the error states before the first reading */\n"
     pace = "".join(f"  double {name};\n" for name in progress.Pace._fields)
     numbers = START_SIGMA + STATES + len(progress.Pace._fields)
-    about = "Everything that a navigator is told. " + (progress.Pace.__doc__ or "")
+    about = "All settings of a navigator. " + (progress.Pace.__doc__ or "")
     return (
         "\n".join(written)
         + f"\n{comment(about)}\ntypedef struct flownav_settings {{\n{parts}{sigma}{pace}}} flownav_settings;\n"
@@ -181,7 +181,7 @@ def _fault(name: str) -> str:
 
 
 def _outcome() -> str:
-    """What a call returns: its head, and rows."""
+    """Declaration of a call's outcome: its head, and rows."""
     head = "".join(f"  double {name};\n" for name in onboard.OutcomeHead._fields)
     rows = (
         f"  flownav_innovation innovation[{onboard.MOST_INNOVATIONS}];\n  flownav_event event[{onboard.MOST_EVENTS}];\n"
@@ -194,7 +194,7 @@ def _outcome() -> str:
 
 
 def script() -> dict[str, Any]:
-    """What `flownav.js` is written from: enumerations, and where numbers lie."""
+    """Source of `flownav.js`: enumerations, and where numbers lie."""
     enumerations = {
         "SENSOR": [(sensor.name, int(sensor)) for sensor in Sensor],
         "STATUS": [(name, value) for name, (value, _) in progress.STATUSES.items()],

@@ -52,7 +52,7 @@ class Flight:
 
 
 class Asked(NamedTuple):
-    """What is to be built. without: parts that are left out (`WITHOUT`)."""
+    """Request for a build. without: parts that are left out (`WITHOUT`)."""
 
     target: str = "linux-x86_64"
     cpu: str = ""
@@ -98,7 +98,7 @@ def code_of(asked: Asked, lag: bool) -> Code:
     return Code(content, code, every - code, lag)
 
 
-# -- what the navigator is told -----------------------------------------------------------------------------
+# -- the navigator's settings -----------------------------------------------------------------------------
 def packed_settings(flight: Flight, pace: progress.Pace) -> tuple[Array, bool]:
     """The settings as the library takes them, and whether they carry the flow sensor's lag.
 
@@ -115,7 +115,7 @@ def pace_of(settings: NavigatorSettingsFile, horizon_s: float, without: tuple[st
 
 
 def rates_of(segment: FedSegment, horizon_s: float) -> Rates:
-    """What rings need room for with these readings: of the IMU and the told attitude their own rates, of all others
+    """Capacity that rings need for these readings: of the IMU and the external attitude their own rates, of all others
     together the most within a horizon; a flow looks for as long as it is from one reading to the next.
     """
     queue = segment.queue
@@ -227,7 +227,7 @@ def _stamp(files: dict[str, bytes], head: str) -> str:
 
 
 def _facts(asked: Asked, code: Code, sizes: Sizes, settings: int, stamp: str, flight: str) -> dict[str, Any]:
-    """What the library is, in numbers."""
+    """Facts of the library: its build, sizes and rates."""
     return {
         "build": stamp,
         "version": __version__,
@@ -271,7 +271,7 @@ def _written(
 
 
 def built_for(flight: Flight) -> dict[str, Any]:
-    """What a record must say of how it was flown to be fused by a page."""
+    """Facts of a flight that a record must hold to be fused by a page."""
     noise = flight.flow_noise
     return {
         "filter": flight.settings.model_dump(),
@@ -282,7 +282,7 @@ def built_for(flight: Flight) -> dict[str, Any]:
 
 
 def measured(target: str) -> dict[str, Any] | None:
-    """What emulation has measured of a target (`tools/onboard.py` writes it); None of others."""
+    """Figures that emulation has measured of a target (`tools/onboard.py` writes them); None of others."""
     file = Path(__file__).parent / "files" / "measured.json"
     found: dict[str, dict[str, Any]] = json.loads(file.read_text(encoding="utf-8"))
     return found.get(target)

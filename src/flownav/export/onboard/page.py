@@ -14,7 +14,7 @@ WHOLE = re.compile(r"\bfigures\.(?=[a-z])")  # a namespace that a page of one sc
 
 
 def page_of(module: bytes, around: str, flight: str, built_for: dict[str, Any]) -> str:
-    """The page. around: `flownav.js`; built_for: what a record must say to be fused by it."""
+    """The page. around: `flownav.js`; built_for: the facts that a record must hold to be fused by it."""
     template = Environment(loader=PackageLoader(__package__, "files/page"), autoescape=False).get_template(
         "page.html.j2"
     )

@@ -1,4 +1,4 @@
-"""`flownav verify`: what a board or a browser says of a flight, held against the same flight computed here."""
+"""`flownav verify`: the output of a board or a browser for a flight, compared with the same flight computed here."""
 
 import hashlib
 import re
@@ -20,17 +20,17 @@ MOST_LINES = 1_000_000
 
 
 class Said(NamedTuple):
-    """What is said: after how many readings (None: after all), which digest."""
+    """A digest that a board reported, and after how many readings (None: after all)."""
 
     readings: int | None
     digest: int
 
 
 class Found(NamedTuple):
-    """What came of it: how many digests were compared, how many are the same, and where the first difference is.
+    """Result of a comparison: how many digests were compared, how many are the same, and where the first difference is.
 
     same: after how many readings the last digest before it was still right; differs: after how many it is wrong, and
-    what was read then.
+    the reading then.
     """
 
     compared: int
@@ -45,7 +45,9 @@ class Found(NamedTuple):
 
 
 def said_by(what: str) -> list[Said]:
-    """What a digest, or a file with a line for each (readings, digest), says. InputError where it is neither."""
+    """Digests of a text that is one, or of a file with a line for each (readings, digest). InputError where it is
+    neither.
+    """
     if DIGEST.fullmatch(what):
         return [Said(None, int(what, 16))]
     path = Path(what)
@@ -63,10 +65,14 @@ def said_by(what: str) -> list[Said]:
 
 
 def compare(said: Sequence[Said], given: Sequence[Given], board: Board) -> Found:
-    """Feed the readings here, and hold each digest against what is said. InputError where more was read."""
+    """Feed the readings here, and compare each digest with the reported one. InputError where the report has more
+    readings.
+    """
     last = max((each.readings for each in said if each.readings is not None), default=0)
     if last > len(given):
-        raise InputError(f"a digest is said of {last} readings, and the flight has {len(given)}: it is another flight")
+        raise InputError(
+            f"a digest is reported after {last} readings, and the flight has {len(given)}: it is another flight"
+        )
     after = {each.readings if each.readings is not None else len(given): each.digest for each in said}
     equal, same = 0, 0
     for count, reading in enumerate(given, 1):
@@ -93,7 +99,7 @@ def board_for(flight: Flight, rates: Rates, without: tuple[str, ...] = ()) -> Bo
 
 
 def verified(said: Sequence[Said], flight: Flight, rates: Rates) -> Found:
-    """What is said of a whole flight, compared."""
+    """Result of comparing the digests reported of a whole flight with this machine's."""
     return compare(said, readings_of(flight), board_for(flight, rates))
 
 

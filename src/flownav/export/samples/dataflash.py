@@ -185,7 +185,7 @@ def _qualities(log: Log, sensor: Sensor) -> list[float]:
 
 
 def _estimated(own: Table) -> Iterator[Row]:
-    """ATT and XKF1: what the vehicle's own filter said."""
+    """ATT and XKF1: the estimate of the vehicle's own filter."""
     angles, velocity = np.degrees(angles_of(own)), velocities_ned(own)
     turned = np.where(np.arange(3) == 2, angles % 360.0, angles)
     place = np.column_stack([own[name] for name in POSITION_NED])

@@ -1,7 +1,7 @@
 """The flight that the sample logs are of, its log, what writers need of one, and the plainer logs written.
 
 The folder of CSV files is what `logs/csv_folder.py` reads (docs/reference/csv-folder.md); a ground station's MAVLink
-log is what the simulated vehicle of `live` tells, a time before each frame.
+log holds the messages of the simulated vehicle of `live`, a time before each frame.
 """
 
 import struct
@@ -37,13 +37,13 @@ LINK_S = 0.004  # from the vehicle to the ground station
 
 @lru_cache(maxsize=2)
 def sample_log(seed: int) -> Log:
-    """What the vehicle of the sample flight logged: streams at their arrival, the truth, the estimate it flew on."""
+    """The log of the sample flight: streams at their arrival, the truth, and the estimate that the autopilot used."""
     setup = assemble(load_scenario(str(shipped(SCENARIO))))
     return replace(log_of(fly_recorded(setup, seed), setup), origin_deg_m=ORIGIN_DEG_M)
 
 
 def sample_record(seed: int) -> Record:
-    """A flight of `pad_return` by the same vehicle; it does not say when, so that a seed gives the same bytes."""
+    """A flight of `pad_return` by the same vehicle; it states no time, so that a seed gives the same bytes."""
     setup = assemble(with_vehicle(load_scenario(RECORD_SCENARIO), VEHICLE))
     record = fly_recorded(setup, seed)
     record.manifest["command"] = f"flownav fly {RECORD_SCENARIO} --vehicle {VEHICLE} --seed {seed}"

@@ -139,7 +139,7 @@ class Written(NamedTuple):
 
     @property
     def commands(self) -> list[str]:
-        """What to try with it."""
+        """Commands to try with it."""
         return [command.format(path=self.path) for command in self.sample.commands]
 
 
@@ -200,7 +200,7 @@ def _put(sample: Sample, made: Path, path: Path, *, force: bool, known: dict[str
 
 
 def _known(folder: Path) -> dict[str, str] | None:
-    """Digests by name of what flownav wrote into a folder, as its README says; None where that is not ours."""
+    """Digests by name of what flownav wrote into a folder, as its README has them; None where that is not ours."""
     readme = folder / README
     text = readme.read_text(encoding="utf-8", errors="replace") if readme.is_file() else ""
     if not text.startswith(FIRST_LINE):
@@ -223,7 +223,7 @@ def _content(path: Path) -> dict[str, bytes]:
 
 
 def readme(seed: int, digests: Mapping[str, str]) -> str:
-    """What the files are, in words, and their digests by name, by which flownav knows them again."""
+    """Description of the files in words, with their digests by name, by which flownav knows them again."""
     lines = [FIRST_LINE, *ABOUT.format(seed=seed).splitlines(), ""]
     for sample in SAMPLES:
         lines += [f"{sample.name} ({sample.kind})", f"  {sample.what}. Try here:"]

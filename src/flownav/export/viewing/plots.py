@@ -1,4 +1,4 @@
-"""What a record says over time, in Rerun's words, and how the viewer is laid out when it opens."""
+"""A record over time, in Rerun's terms, and the viewer's layout when it opens."""
 
 from typing import Any
 

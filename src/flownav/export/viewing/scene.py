@@ -1,6 +1,6 @@
 """The flight in space, in Rerun's words. Needs the package rerun-sdk.
 
-Frames: `/enu` (east, north, up: right-handed, z up, what Rerun's view is told) > `/enu/ned` > everything else, so that
+Frames: `/enu` (east, north, up: right-handed, z up, the axes of Rerun's view) > `/enu/ned` > everything else, so that
 every position stands in the file as the record has it, in NED metres, and body axes are forward-right-down.
 """
 
@@ -100,7 +100,7 @@ def _log_camera(stream: Any, entity: str, camera: Camera) -> None:
 
 
 def _log_flow(stream: Any, record: Record, path: Trajectory) -> None:
-    """The velocity that the flow says, as an arrow from the vehicle: a metre for a metre per second."""
+    """The velocity by the flow, as an arrow from the vehicle: a metre for a metre per second."""
     arrows = flow_arrows(record)
     if arrows is None:
         return

@@ -1,7 +1,7 @@
-"""What is drawn in space: the vehicle and its cameras as outlines in body axes (FRD) [m], the flow as a velocity.
+"""Shapes drawn in space: the vehicle and its cameras as outlines in body axes (FRD) [m], the flow as a velocity.
 
-What the record does not say (a replayed log knows nothing of the airframe) is drawn as a small cross of axes and
-nothing more: no size is made up. The flow's velocity is flow less the sensor's own turning, times the range.
+Where the record does not describe the airframe (a replayed log does not), a small cross of axes is drawn and nothing
+more: no size is made up. The flow's velocity is flow less the sensor's own turning, times the range.
 """
 
 import math
@@ -18,8 +18,8 @@ from flownav.core.record import Record, mapping
 Outline = Array  # (n, 3) points of one line in body FRD [m]
 
 CIRCLE_POINTS = 48
-LONGEST_SIDE_M = 20.0  # of a vehicle that is drawn; what a damaged record says beyond is not
-OLDEST_RANGE_S = 0.5  # a range that came longer ago than this says nothing of the height now
+LONGEST_SIDE_M = 20.0  # of a vehicle that is drawn; a damaged record's numbers beyond are not
+OLDEST_RANGE_S = 0.5  # a range that came longer ago than this is no evidence on the height now
 
 
 class Camera(NamedTuple):
@@ -134,7 +134,7 @@ class FlowArrows(NamedTuple):
 
 
 def flow_arrows(record: Record) -> FlowArrows | None:
-    """The velocity that the flow says, row by row of `flow_rate` (with its gyro and `range`) or `flow_velocity`.
+    """The velocity by the flow, row by row of `flow_rate` (with its gyro and `range`) or `flow_velocity`.
 
     Rows of quality 0, without the sensor's gyro, or without a range of the last half second are NaN. None where the
     record holds neither table.

@@ -2,13 +2,13 @@
 
 Names that older firmware used are given in the comments: a ground station would refuse them on a newer one.
 
-What a log does not identify is not written: the file says so, and the vehicle keeps what it has. The latency counts as
-identified where the verdict on the excitation says it, a gain where its own does and the model holds on unseen data.
-A limit follows from a datasheet alone (`--base`): the fastest flow, the greatest height and the least quality of one
-flight are what was flown, and an autopilot refuses all flow beyond them.
+A quantity that a log does not identify is not written: the file states this, and the vehicle keeps its own. The latency
+counts as identified where the verdict on the excitation states it, a gain where its own does and the model holds on
+unseen data. A limit follows from a datasheet alone (`--base`): the fastest flow, the greatest height and the least
+quality of one flight are only those of that flight, and an autopilot refuses all flow beyond them.
 
-PX4's noise is an angular rate that runs from N_MIN at quality 255 to N_MAX at QMIN; ArduPilot's is one number.
-Neither knows height: the figure taken is the noise over height where it is worst, so the filter is never told less.
+PX4's noise is an angular rate that runs from N_MIN at quality 255 to N_MAX at QMIN; ArduPilot's is one number. Neither
+depends on height: the figure taken is the noise over height where it is worst, so the filter is never given less.
 """
 
 import math
@@ -71,7 +71,7 @@ def _knows_latency(findings: Findings) -> bool:
 
 
 def _turn(autopilot: str, findings: Findings) -> list[str]:
-    """What to do about axes that are not the vehicle's: turned by 180 degrees can be set, other faults are wiring."""
+    """Advice on axes that are not the vehicle's: a turn by 180 degrees can be set, other faults are wiring."""
     if findings.axes.right or findings.kind == "rig":
         return []
     if "180" in findings.axes.verdict:

@@ -24,7 +24,7 @@ START_TIME_S = 0.1  # unit of a start's rates
 SMALLEST_EIGENVALUE = 1e-14
 SMALLEST_DIAGONAL = 1e-100  # beside the largest: far below what any data give, far above what overflows
 LEAST_DIAGONAL = 1e-60  # where there is nothing beside it: of data that move by LEAST_MOTION it is more
-MOST_STIFFNESS = 100.0  # rate x step of a model that is tried: faster ones cannot be told from none
+MOST_STIFFNESS = 100.0  # rate x step of a model that is tried: faster ones cannot be distinguished from none
 LARGEST_PRODUCT = 1e60  # of an unstable model: it has no cost
 
 
@@ -203,7 +203,7 @@ def begin(runs: Sequence[Experiment], structure: Structure, start: Point) -> Sta
 
 
 def descend(runs: Sequence[Experiment], structure: Structure, state: State, iterations: int) -> State:
-    """Levenberg-Marquardt from a state, for so many iterations at most."""
+    """Levenberg-Marquardt from a state, for at most `iterations` iterations."""
     readings, damping = sum(len(run.t_y) for run in runs), 1e-3
     for _ in range(iterations):
         if state.converged or not np.isfinite(state.cost):

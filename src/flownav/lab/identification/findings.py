@@ -1,4 +1,4 @@
-"""What an identification found, whatever kind of log it came from: the one bundle that file, JSON and table read."""
+"""Findings of an identification, whatever kind of log it came from: the one bundle that file, JSON and table read."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -78,11 +78,11 @@ def noise_of(
 class Findings:
     """Everything found.
 
-    kind: "rig" or "flight"; reference: what the sensor was compared with; max_flow_rad_s: the fastest flow seen
-    while usable (99.9 %); heights_m: least and greatest; notes: one line each; details: further figures for JSON;
+    kind: "rig" or "flight"; reference: what the sensor was compared with; max_flow_rad_s: the fastest flow seen while
+    usable (99.9 %); heights_m: least and greatest; notes: one line each; details: further figures for JSON;
     scale_with_speed: None where no law shows. offset: of the flow [rad/s], None where the log does not show it.
-    own_gyro: the sensor's against the IMU's, None where either lacks. parameters: what the vehicle was set to, as far
-    as the log says. datasheet: the file that was given for what no log tells; None where none was.
+    own_gyro: the sensor's against the IMU's, None where either lacks. parameters: the vehicle's own settings, as far as
+    the log states them. datasheet: the file given for numbers that no log shows; None where none was.
     """
 
     kind: str
@@ -105,7 +105,7 @@ class Findings:
 
     @property
     def gyro_verdict(self) -> str:
-        """What the sensor's own gyro shows to be wrong, in words; "" where nothing is."""
+        """Verdict on the sensor's own gyro, in words; "" where nothing is wrong."""
         return "" if self.own_gyro is None else self.own_gyro.sentence(abs(self.gain.value))
 
     @property

@@ -62,7 +62,7 @@ def judge(response: Array, yaw_known: bool = True) -> Axes:
 
 
 def sentence(assignment: Array) -> str:
-    """What is wrong with axes that lie so, in words."""
+    """Verdict on axes that lie so, in words."""
     swapped = assignment[0, 0] == 0.0
     inverted = [axis for axis, row in zip("xy", assignment, strict=True) if row.sum() < 0.0]
     parts = ["axes are swapped"] if swapped else []
@@ -84,7 +84,7 @@ def one_axis(gain: float) -> Axes:
 
 # -- a flight judged ---------------------------------------------------------------------------------------------
 class Judged(NamedTuple):
-    """The flight, its motion by the reference, the flow's response to it (2, 2), and what that says of the axes."""
+    """The flight, its motion by the reference, the flow's response to it (2, 2), and the axes by that response."""
 
     flown: Flight
     moved: reference_motion.Motion
@@ -128,7 +128,7 @@ AGREE, IN_PART = 0.9, 0.4  # correlation from which two velocities agree, or do 
 
 
 class Look(NamedTuple):
-    """What flow and reference say of each other once the axes are put right.
+    """Comparison of flow and reference once the axes are put right.
 
     against: the reference's name; correlation of the two velocities; lag_s: how much later the reference arrives than
     what the flow describes; scale: flow over reference; axes: the verdict on the sensor's axes, clear: beyond doubt.
@@ -145,7 +145,7 @@ class Look(NamedTuple):
     own_attitude: bool
 
     def differences(self) -> str:
-        """What keeps the two from being the same although they are alike, in words; "" where little does."""
+        """Differences that remain between the two although they are alike, in words; "" where they are small."""
         more, ahead = self.scale - 1.0, self.lag_s
         found = [f"the flow reads {100 * abs(more):.0f} % too {'much' if more > 0 else 'little'}"] * (abs(more) > OFF)
         late = ahead < -APART_S or ahead > LATEST_S

@@ -1,13 +1,14 @@
 """A flight log for identification: usable flow, a range to go by, a reference track, the motion between.
 
 A range is not believed where it sticks to its floor or stands far from the median of those around. What is left may
-still jump: a sonar that hears now the ground, now something else. Its doubt, the share of steps that jump times their
-usual size over the range, is an error of every gain that the log shows, and no length of log takes it out.
+still jump: a sonar whose echo comes now from the ground, now from something else. Its doubt, the share of steps that
+jump times their usual size over the range, is an error of every gain that the log shows, and no length of log takes it
+out.
 
-The sensor's velocity along body x and y comes from angular rates times range (`prepare` takes the rotation out),
-or as the sensor says it, in flight only. The reference is the log's truth (or visual odometry), GPS without one. The
-IMU's earth acceleration ties both to the vehicle's clock: it gives the flow's latency as an autopilot needs it, and
-shows swapped or inverted axes even where the reference's heading is unknown.
+The sensor's velocity along body x and y comes from angular rates times range (`prepare` takes the rotation out), or as
+the sensor reports it, in flight only. The reference is the log's truth (or visual odometry), GPS without one. The IMU's
+earth acceleration ties both to the vehicle's clock: it gives the flow's latency as an autopilot needs it, and shows
+swapped or inverted axes even where the reference's heading is unknown.
 """
 
 from dataclasses import dataclass
@@ -107,12 +108,12 @@ IMU_NAME = "the IMU"
 
 @dataclass(frozen=True)
 class Flight:
-    """What identification needs of a flight.
+    """A flight's data for identification.
 
-    t_s (n,) arrival of each flow reading, velocity_m_s (n, 2) along body x and y, age_s what the log says of how
-    old a reading is when it arrives (half its exposure), quality (n,), range_m (n,), good (n,) usable readings;
-    reference_t_s (m,), reference_m (m, 3) north, east, down of a frame that may be turned, reference ("truth" or
-    "gps") and its own velocity where it has one; imu None without one; range_jumping, range_doubt as `usable.Ranges`.
+    t_s (n,) arrival of each flow reading, velocity_m_s (n, 2) along body x and y, age_s the age of a reading on arrival
+    by the log (half its exposure), quality (n,), range_m (n,), good (n,) usable readings; reference_t_s (m,),
+    reference_m (m, 3) north, east, down of a frame that may be turned, reference ("truth" or "gps") and its own
+    velocity where it has one; imu None without one; range_jumping, range_doubt as `usable.Ranges`.
     """
 
     name: str

@@ -46,7 +46,7 @@ CLEAR_LIKENESS = 0.8  # likeness to the IMU from which it, and not the reference
 class Scale(NamedTuple):
     """The sensor's response (2, 2) to body velocity, with its axes put right: gains on the diagonal.
 
-    bias: share by which noise in the regressor pulls each gain, at most; method says which side that was.
+    bias: share by which noise in the regressor pulls each gain, at most; method names that side.
     """
 
     response: Array
@@ -111,7 +111,7 @@ def _check_alike(flown: Flight, moved: Motion) -> None:
     if best < LEAST_LIKENESS:
         raise InputError(
             f"{flown.name}: the flow does not follow the reference ({flown.reference_name}; their velocities' "
-            f"correlation is {best:.2f}, {LEAST_LIKENESS:g} is needed): no scale can be told; `flownav info` shows "
+            f"correlation is {best:.2f}, {LEAST_LIKENESS:g} is needed): no scale can be found; `flownav info` shows "
             "range, quality and clock"
         )
 
@@ -124,7 +124,7 @@ def _doubted(scale: Scale, flown: Flight, axis: int) -> Interval:
 
 
 def _age(flown: Flight, moved: Motion) -> float:
-    """How old a flow reading is when it arrives, to turn it by the right attitude; what the log says where unsure."""
+    """How old a flow reading is when it arrives, to turn it by the right attitude; the log's own value where unsure."""
     tie = moved.flow_tie
     return tie.delay_s.value if tie is not None and tie.holds else flown.age_s
 
@@ -133,7 +133,7 @@ def _latency(flown: Flight, moved: Motion, against_reference: Interval) -> Inter
     """On the vehicle's clock: the better-known of the IMU's word and the reference's, whose delay is taken out.
 
     The IMU's word is of the log's attitude. Where that is an estimate, its errors pass for delays: then it is the
-    latency against the reference as that is stamped, and the interval takes in the delay that the IMU says it has.
+    latency against the reference as that is stamped, and the interval includes the delay that the IMU shows.
     """
     if flown.attitude_is_own:
         delay_s, (value, low, high) = moved.reference_delay_s, against_reference
@@ -211,7 +211,7 @@ def _axis_run(flown: Flight, moved: Motion, velocity: Array, axis: int) -> Exper
 def _dynamic_runs(
     flown: Flight, moved: Motion, velocity: Array, runs: Sequence[Experiment]
 ) -> Sequence[Sequence[Experiment]]:
-    """What shows the dynamics of x and of y: above 1/SPLIT_S the IMU where it serves, else the reference."""
+    """Experiments for the dynamics of x and of y: above 1/SPLIT_S of the IMU where it serves, else of the reference."""
     if moved.fast_m_s is None or moved.flow_tie is None or moved.flow_tie.likeness < CLEAR_LIKENESS:
         return [[run] for run in runs]
     other = fast_flow(flown, moved.t_s, velocity)

@@ -6,9 +6,9 @@ Named laws for the standard deviation of the velocity error at height h:
   sqrt(0.6/h), and finds 0.9 at every height; that is a fit of 0.90 sqrt(0.6/h), and fit = 1 - sigma/sigma_signal.
 - `power`: sigma_r (h/h_r)^n, fitted; Table 2's means give 0.0350 (h/0.6)^2.06 m/s.
 
-Schedules compared: `constant` (one variance), `quality` (variance by the reading's quality, as PX4 does between
-its N_MIN and N_MAX), `height` (the fitted power law), `paper`. Each is fitted on every other block of the log and
-scored on the blocks between by the mean of log sigma + e^2/(2 sigma^2): the lower, the better the filter is told.
+Schedules compared: `constant` (one variance), `quality` (variance by the reading's quality, as PX4 does between its
+N_MIN and N_MAX), `height` (the fitted power law), `paper`. Each is fitted on every other block of the log and scored on
+the blocks between by the mean of log sigma + e^2/(2 sigma^2): the lower, the better the schedule.
 """
 
 from collections.abc import Callable, Sequence
@@ -78,7 +78,7 @@ class QualityPoint(NamedTuple):
 
 
 class ScheduleScore(NamedTuple):
-    """How well a schedule of the variance tells a filter the error, on readings it was not fitted to."""
+    """How well a schedule of the variance describes the error to a filter, on readings it was not fitted to."""
 
     name: str
     score: float  # mean of log sigma + e^2/(2 sigma^2)

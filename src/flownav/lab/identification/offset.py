@@ -1,4 +1,4 @@
-"""What a flow sensor reads where nothing moves: a drift that is fixed in the body's axes, about x and about y [rad/s].
+"""Offset of a flow sensor where nothing moves: a drift that is fixed in the body's axes, about x and about y [rad/s].
 
 Flow, its rotation taken off and its axes put right, is regressed on the reference's motion over the range and a
 constant: as an angle, since a constant velocity at every height would be another fault. A vehicle that flies
@@ -74,7 +74,7 @@ def flow_offset(flown: Flight, moved: Motion, velocity: Array, response: Array, 
 
 
 def _wander(flown: Flight, t_s: Array, range_m: Array) -> float:
-    """What a receiver's slow errors of velocity, which are fixed in earth axes, make of an offset [rad/s]."""
+    """Error of an offset due to a receiver's slow errors of velocity, which are fixed in earth axes [rad/s]."""
     if flown.reference != "gps":
         return 0.0
     level = flown.rotation(t_s)

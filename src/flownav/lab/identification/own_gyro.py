@@ -1,8 +1,9 @@
 """The flow sensor's own gyro against the vehicle's: both turn with one body, so the slope of one on the other is 1.
 
-It needs no reference. A slope of 0.5 says that the sensor's angles are divided by a time twice too long, where the
-flow itself reads half as well, or where nothing tells; it is the gyro's own scale where the flow reads as it should. A
-scaler on the flow mends neither: autopilots scale the flow alone, and not the rotation that they take out of it.
+It needs no reference. A slope of 0.5 means that the sensor's angles are divided by a time twice too long, where the
+flow itself reads half as well, or where nothing is known of it; it is the gyro's own scale where the flow reads as it
+should. A scaler on the flow mends neither: autopilots scale the flow alone, and not the rotation that they take out of
+it.
 """
 
 from typing import NamedTuple
@@ -46,7 +47,7 @@ class OwnGyro(NamedTuple):
         return self.told and (self.slope.high < low or self.slope.low > high)
 
     def sentence(self, gain: float | None) -> str:
-        """What is wrong, in words; "" where nothing is. gain: the flow's own over the true one, None where unknown."""
+        """Verdict in words; "" where nothing is wrong. gain: the flow's own over the true one, None where unknown."""
         if not self.is_off:
             return ""
         slope, low, high = self.slope

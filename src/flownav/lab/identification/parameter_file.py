@@ -16,7 +16,7 @@ AUTOPILOTS = {"px4": ".params", "ardupilot": ".param", "inav": ".txt"}
 class Parameter(NamedTuple):
     """A name, its value in the autopilot's unit, its MAVLink type and where it comes from.
 
-    needed: the value that the log asks for, where the parameter's range does not reach so far; else None.
+    needed: the value that the log requires, where the parameter's range does not reach so far; else None.
     """
 
     name: str
@@ -32,7 +32,7 @@ class Parameter(NamedTuple):
 
 
 def within(name: str, wanted: float, low: float, high: float, kind: int, reason: str) -> Parameter:
-    """A parameter whose range is low to high: a value that it cuts is said."""
+    """A parameter within its range low to high; where a value is cut, the reason states it."""
     held = min(max(wanted, low), high)
     if held == wanted:
         return Parameter(name, wanted, kind, reason)

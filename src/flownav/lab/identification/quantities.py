@@ -1,14 +1,14 @@
-"""What a fitted model means, each quantity with its interval; what the input shows of it, and which order to choose.
+"""Quantities of a fitted model, each with its interval; what the input shows of it, and which order to choose.
 
 The latency is the delay of a slow signal, T + a_{n-1}/a_n: the one number that gain and delay models, the paper's
 second-order ones (b/c) and an autopilot's delay parameter share.
 
 Excitation. The covariance of the fit, in relative units (log coefficients, gain over its value, delay over the
 latency), has as many directions as the model has parameters. A direction counts as identified where its standard
-deviation is at most 5 % and no more than 50 times that of the best-determined one: the first says that the log
-is long and quiet enough, the second that the input, whatever its length, tells the direction apart. A pendulum's
-single tone passes for two directions, gain and latency, and no more (persistence of excitation of order two);
-its residual then supports many triplets (a, b, c) equally, as the paper's Table 1 shows.
+deviation is at most 5 % and no more than 50 times that of the best-determined one: the first shows that the log is long
+and quiet enough, the second that the input, whatever its length, distinguishes the direction. A pendulum's single tone
+passes for two directions, gain and latency, and no more (persistence of excitation of order two); its residual then
+supports many triplets (a, b, c) equally, as the paper's Table 1 shows.
 """
 
 from __future__ import annotations
@@ -181,7 +181,7 @@ class Choice:
 
     @property
     def widest(self) -> Excitation:
-        """What the input says of the paper's second-order model, where it was tried; else of the chosen one."""
+        """Excitation of the paper's second-order model, where it was tried; else of the chosen one."""
         return next((shown for model, shown in self.tried if model.structure == Structure(2)), self.excitation)
 
 

@@ -133,7 +133,7 @@ def _height(log: Log) -> Witness | None:
 
 
 def _keeps(witness: Witness | None, start_s: float, end_s: float) -> bool:
-    """Whether a truth tells of one height from a start to an end; a barometer is too noisy to."""
+    """Whether the witness is a truth that stays at one height from start to end; a barometer is too noisy for that."""
     if witness is None or witness[0] != "truth":
         return False
     inside = (witness[2] >= start_s) & (witness[2] <= end_s)

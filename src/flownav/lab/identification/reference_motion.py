@@ -26,9 +26,9 @@ EDGE_SPLITS = 5.0  # of those are left out at either end
 HALF_SPAN_S = 0.1  # of the differences that make a reference's velocity
 SIGNIFICANT_SIGMAS = 4.0  # standard errors of a correlation of nothing
 IMU_ERROR_RAD = 0.25  # of its word on the reference's heading
-LEAST_ALIKE = 0.5  # correlation of flow and reference from which the flow says the reference's heading
+LEAST_ALIKE = 0.5  # correlation of flow and reference from which the flow gives the reference's heading
 ALIKE_S, ALIKE_LAGS_S = 0.5, (-0.2, 0.6, 0.02)
-WIDEST_DELAY_S = 0.3  # an interval wider than this says nothing
+WIDEST_DELAY_S = 0.3  # an interval wider than this carries no information
 
 
 class Tie(NamedTuple):
@@ -113,7 +113,7 @@ def motion(flown: Flight) -> Motion:
     delay = tie.delay_s.value if tie.holds else 0.0
     earth = _turned(on_grid(grid, reference, grid + delay), -yaw)
     if flown.reference == "gps" and tie.holds:
-        earth = smoothed(earth) + fast  # positions of a GPS receiver say nothing within a second
+        earth = smoothed(earth) + fast  # positions of a GPS receiver carry no information within a second
     moved = Motion(grid, earth, yaw, yaw_known, delay, tie, None, fast)
     return with_flow(moved, flown, flown.velocity_m_s)
 
@@ -121,8 +121,8 @@ def motion(flown: Flight) -> Motion:
 def _yaw(flown: Flight, grid: Array, reference: Array, tie: Tie | None) -> tuple[float, bool]:
     """From the vehicle's north to the reference's [rad], and whether a sensor that is turned would show.
 
-    GPS has the attitude's north. Of any other reference the IMU says it, where it saw the same motion; where it did
-    not, or says more than IMU_ERROR_RAD else than the flow does (an accelerometer that lies), the flow says it: as it
+    GPS has the attitude's north. Of any other reference the IMU gives it, where it saw the same motion; where it did
+    not, or differs by more than IMU_ERROR_RAD from the flow's (an accelerometer that errs), the flow gives it: as it
     is, or by whole quarter turns from the IMU's word.
     """
     if flown.reference == "gps":
@@ -177,7 +177,7 @@ def flow_likeness(flown: Flight, grid: Array, reference: Array, velocity: Array 
 def velocity_response(flown: Flight, moved: Motion, age_s: float) -> Array:
     """(2, 2) regression of flow on the reference's body velocity: enough for signs and axes.
 
-    age_s: how old a flow reading is when it arrives; what the log says where the heading is not known.
+    age_s: how old a flow reading is when it arrives; the log's own where the heading is not known.
     """
     if not moved.yaw_known:
         age_s = flown.age_s

@@ -40,7 +40,7 @@ LEAST_SPAN_S = 0.05
 
 
 class Rig(ParameterModel):
-    """rig.toml, as far as identification needs it; what else it says is left alone."""
+    """rig.toml, as far as identification needs it; its other entries are left alone."""
 
     model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
 
@@ -70,7 +70,7 @@ def is_rig(path: Path) -> bool:
 
 
 def read_runs(path: Path, height_m: float | None = None, reference: str = "auto") -> list[Run]:
-    """Every run of a rig log. height_m replaces what rig.toml says. InputError names what is missing and where."""
+    """Every run of a rig log. height_m replaces rig.toml's. InputError names what is missing and where."""
     if not an_input(path).exists():
         raise InputError(f"{path}: no such file or folder; identify takes rig logs, rig CSV files and flight folders")
     if reference not in ("auto", *REFERENCES):

@@ -1,4 +1,4 @@
-"""A flow sensor's scale and axes from how far it says the vehicle went, and whether the scale changes with speed.
+"""A flow sensor's scale and axes from the distance that it reports, and whether the scale changes with speed.
 
 Regressing velocity on velocity is biased: noise, lag and tilt in the regressor pull the slope down (0.7 to 0.8 for
 one axis of the outdoor log, whose true scale is near 1). Here the reference's noise stays on the left-hand side,
@@ -221,7 +221,7 @@ WINDOW_S = {"truth": 1.0, "gps": 2.0}
 SLOWEST_M_S = {"truth": 0.15, "gps": 0.7}
 LEAST_WINDOWS, LEAST_CLUSTERS = 20, 4
 LEAST_SPREAD = 1.5  # fast over slow: of less, no law shows
-LEAST_CHANGE = 0.03  # from slow to fast, of the scale: of less, nobody needs to know
+LEAST_CHANGE = 0.03  # from slow to fast, of the scale: less is not reported
 
 
 class SpeedLaw(NamedTuple):

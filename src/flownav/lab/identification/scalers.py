@@ -19,7 +19,7 @@ APART = 0.1  # of a gain: its axes and heights may differ by so much where one f
 
 
 def scalers(autopilot: str, findings: Findings) -> list[Parameter]:
-    """The factors that the log tells."""
+    """The factors that the log shows."""
     found = []
     for _, gain, parameter_of, doubts in _wanted(autopilot, findings):
         if gain is not None and not doubts:
@@ -130,7 +130,7 @@ def _doubts(findings: Findings, axis: str) -> Iterator[str]:
 
 
 def _response_along(findings: Findings, axis: str) -> Response | None:
-    """What shows an axis's gain: of a rig, which moves along one axis, the best of all heights."""
+    """Response that shows an axis's gain: of a rig, which moves along one axis, the best of all heights."""
     along = [response for response in findings.responses if response.axis == axis]
     if not along:
         return None

@@ -1,7 +1,7 @@
 """Findings as a sensor file: the datasheet that simulation, replay and campaigns read, written whole or not at all.
 
-What a log cannot tell (optics, limits, the sonar's floor) is taken over from a base file and says so. Dynamics that
-the input did not show are those of a second-order Bessel lag with the identified gain and latency, and say so.
+Entries that a log cannot show (optics, limits, the sonar's floor) are taken from a base file and marked so. Dynamics
+that the input did not show are those of a second-order Bessel lag with the identified gain and latency, and marked so.
 """
 
 import math

@@ -47,7 +47,7 @@ class Camera(NamedTuple):
 
 
 class Exposure(NamedTuple):
-    """What automatic exposure settled on: time [s], gain, and the grey level of a perfectly white pad."""
+    """Result of automatic exposure: time [s], gain, and the grey level of a perfectly white pad."""
 
     time_s: float
     gain: float
@@ -144,7 +144,7 @@ class Lens(NamedTuple):
 
 
 class Calibration(NamedTuple):
-    """How far off what a detector believes of its lens is, one standard deviation each."""
+    """Errors of a detector's calibration of its lens, one standard deviation each."""
 
     focal_share: float = 0.003
     centre_px: float = 1.0

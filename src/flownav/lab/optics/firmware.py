@@ -19,8 +19,8 @@ DEFAULT = "2014-12"
 class Firmware(NamedTuple):
     """One version's numbers and switches.
 
-    `first_px` and `step_px` place the corners of the patches; 0 asks for the firmware's own formula, which
-    spreads `patches` x `patches` over the frame. The switches named `..._defect` reproduce a known fault.
+    `first_px` and `step_px` place the corners of the patches; 0 takes the firmware's own formula, which spreads
+    `patches` x `patches` over the frame. The switches named `..._defect` reproduce a known fault.
     """
 
     name: str

@@ -90,7 +90,7 @@ def _video(path: Path) -> NDArray[np.uint8]:
 
 
 def signature() -> Any:
-    """What says in a PNG who wrote it."""
+    """Text entry of a PNG that names its writer."""
     from PIL.PngImagePlugin import PngInfo
 
     text = PngInfo()

@@ -128,7 +128,7 @@ LARGEST_RASTER_TEXELS = 8192
 
 
 class PadTarget(NamedTuple):
-    """What lies on the ground: `side_m` is that of the black square of a tag, or of a plain pad's outline.
+    """The target on the ground: `side_m` is that of the black square of a tag, or of a plain pad's outline.
 
     Of a nested tag `side_m` is the outer's, and `code` the inner's; the outer's is the next.
     """
@@ -139,7 +139,7 @@ class PadTarget(NamedTuple):
 
     @property
     def coded(self) -> bool:
-        """Whether the target tells its identity and which way it points."""
+        """Whether the target shows its identity and its heading."""
         return self.pattern in ("tag", "nested")
 
     @property
@@ -211,8 +211,8 @@ def corners_m(target: PadTarget) -> NDArray[np.float64]:
 def laid_out(target: PadTarget, extent_m: float, finest_texel_m: float, seed: int = 1) -> Pad:
     """The board, centred on the origin, on ground that repeats after `extent_m` or a little more.
 
-    Texels are `finest_texel_m` wide or less, whole parts of a cell, so that edges lie where they are said to.
-    InputError where the raster would be too large.
+    Texels are `finest_texel_m` wide or less, whole parts of a cell, so that edges lie exactly where the target has
+    them. InputError where the raster would be too large.
     """
     cells = printed_cells(target)
     cell_m = target.board_m / len(cells)

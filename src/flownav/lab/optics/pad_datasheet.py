@@ -14,7 +14,8 @@ SMALLEST_FIGURE = 1e-5  # a figure below this is none
 
 
 class Assumed(NamedTuple):
-    """What no rendered frame tells: rate, latency and jitter, where the lens sits, and how far off it is mounted.
+    """Assumptions that no rendered frame shows: rate, latency and jitter, where the lens sits, and how far off it is
+    mounted.
 
     A camera that is `mounting_deg` off, on top of what its calibration leaves, is so far off in all.
     """

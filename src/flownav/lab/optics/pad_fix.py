@@ -55,7 +55,7 @@ class PadFix(NamedTuple):
 
 
 class PadSearch(NamedTuple):
-    """What came of a frame: a fix, or None and the reason (one of REASONS)."""
+    """Result of a search in a frame: a fix, or None and the reason (one of REASONS)."""
 
     fix: PadFix | None
     reason: str
@@ -211,7 +211,7 @@ class Truth(NamedTuple):
 
 
 def truth_of(pose: Pose, target: PadTarget) -> Truth:
-    """What a perfect fix says, camera axes taken as the body's."""
+    """A perfect fix, camera axes taken as the body's."""
     rotation = np.array(pose[3:]).reshape(3, 3)
     forward, right, down = rotation.T @ np.array([-pose.x_m, -pose.y_m, pose.height_m])
     wider = target.board_m / target.side_m

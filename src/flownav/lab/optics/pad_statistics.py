@@ -1,4 +1,5 @@
-"""What frames of many flights say of a pad detector: rates, noise and bias by height and speed, and laws of them.
+"""Statistics of a pad detector over frames of many flights: rates, noise and bias by height and speed, and laws of
+them.
 
 **Bias** lasts as long as a flight: of the boresight (two angles), of the scale of angles (a focal length that is
 believed too long shows them too small), of the distance. **Noise** is what is left within the flights,
@@ -6,9 +7,9 @@ believed too long shows them too small), of the distance. **Noise** is what is l
     sigma^2 = floor^2 + (per_m r)^2 + (per_rad_s w)^2,
 
 r the reach (the distance squared over the height: from there a level pad looks as small straight above it) and w the
-rate at which the ground straight below passes: the detector's own, what few pixels tell, and what moves while the rows
-are exposed one after the other. **Missed** are a share `hidden` of each flight's frames,
-whatever it does (what lies on the pad, glare), and of the rest those of a probit in r and w.
+rate at which the ground straight below passes: the detector's own, the resolution of few pixels, and the motion while
+the rows are exposed one after the other. **Missed** are a share `hidden` of each flight's frames, whatever it does
+(objects on the pad, glare), and of the rest those of a probit in r and w.
 """
 
 from collections import Counter
@@ -27,7 +28,7 @@ from flownav.lab.optics.pad_trial import TrialFrame
 LEAST_SHARE = 0.5  # of the frames with the whole pad in view: heights that give fewer fixes are out of range
 LEAST_FRAMES = 5
 EASY_RATE_RAD_S, EASY_PART = 1.75, 0.75
-SHARE_FLOOR = 1e-3  # of missed frames: fewer than that nobody measures with some thousand frames
+SHARE_FLOOR = 1e-3  # of missed frames: fewer cannot be measured with some thousand frames
 UNLIKELY_PROBABILITY = 0.01
 REACH_STEP = 1.2
 FIT_PASSES = 3
@@ -90,7 +91,7 @@ class PadLaws(NamedTuple):
 
 
 class FlightBias(NamedTuple):
-    """What lasts in one flight: two angles, the scale of angles (as a focal length too long), the distance's."""
+    """Errors that last for one flight: two angles, the scale of angles (as a focal length too long), the distance's."""
 
     forward_rad: float
     right_rad: float
@@ -201,7 +202,7 @@ def missed_law(c: dict[str, Array], max_height_m: float) -> MissedLaw:
 
     def cost(p: Array) -> float:
         chance = np.clip(probabilities(p), 1e-6, 1.0 - 1e-6)
-        unlikely = 1e-3 * float((p[1:] ** 2).sum() + (p[0] - 2.0) ** 2)  # holds what no frame tells
+        unlikely = 1e-3 * float((p[1:] ** 2).sum() + (p[0] - 2.0) ** 2)  # holds numbers that no frame shows
         return -float((lost * np.log(chance) + (1.0 - lost) * np.log(1.0 - chance)).mean()) + 1e-2 * unlikely
 
     best = minimize(cost, np.array([2.5, 0.0, -1.0]), method="Nelder-Mead", options={"maxiter": 4000}).x
@@ -214,7 +215,7 @@ def missed_law(c: dict[str, Array], max_height_m: float) -> MissedLaw:
 
 
 def hidden_shares(missed: Array, counts: Array) -> Array:
-    """What a flight misses of its easy frames beyond what the median flight does, as a part of the rest of them.
+    """Share of its easy frames that a flight misses beyond the median flight's share, as a part of the rest of them.
 
     None where the median flight might miss as many by chance once in a hundred flights.
     """

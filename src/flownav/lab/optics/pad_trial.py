@@ -105,7 +105,7 @@ class CameraFlight(NamedTuple):
 
 
 class TrialFrame(NamedTuple):
-    """What came of one frame. error (4,): `pad_truth.fix_error`, NaN without a fix.
+    """Result of one frame. error (4,): `pad_truth.fix_error`, NaN without a fix.
 
     reach_m: `pad_truth.Truth`. whole: the whole board is in the frame. image_rate_rad_s: of the ground straight below.
     tangents: of the centre, as they are.
@@ -210,7 +210,7 @@ def whole_in_view(optic: Optic, truth: Truth) -> bool:
 def tried(
     flown: CameraFlight, flight: int, height_m: float, speed_m_s: float, count: int, seed: int, tilt_rad: float
 ) -> Iterator[TrialFrame]:
-    """What the detector makes of so many frames."""
+    """Results of the detector on `count` frames."""
     for frame, pose, motion in frames_at(flown, height_m, speed_m_s, count, seed, tilt_rad):
         truth = truth_of(pose, flown.target)
         fix, reason = look(flown, frame)
@@ -223,7 +223,9 @@ def tried(
 
 
 class Trials(NamedTuple):
-    """Heights and speeds at which every flight takes so many frames, and the standard deviation of its tilt."""
+    """Heights and speeds, the number of frames that every flight takes at each, and the standard deviation of its
+    tilt.
+    """
 
     heights_m: Sequence[float]
     speeds_m_s: Sequence[float]

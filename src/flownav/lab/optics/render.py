@@ -159,7 +159,7 @@ class Raster(NamedTuple):
 
 
 class Chip(NamedTuple):
-    """What digitises an image: exposure, and normals for its noise."""
+    """Digitiser of an image: exposure, and normals for its noise."""
 
     exposure: Exposure
     bank: NDArray[np.float32]

@@ -106,7 +106,7 @@ class Scene(NamedTuple):
 def shadow_of_vehicle(pose: Pose, gloss: Gloss) -> Shadow:
     """Shadow of the vehicle that carries the camera: as far from below it as the sun stands low, along its body.
 
-    Its body and boom are a band of VEHICLE_M about the camera; gloss tells where the sun is.
+    Its body and boom are a band of VEHICLE_M about the camera; gloss shows where the sun is.
     """
     away = pose.height_m / -gloss.sun_z
     ahead = np.hypot(pose.r11, pose.r21)

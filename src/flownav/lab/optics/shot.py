@@ -38,7 +38,7 @@ class Optic(NamedTuple):
 
 
 class View(NamedTuple):
-    """What a lens makes of every pixel: its ray (h, w, 2) and how bright an even scene is there (h, w)."""
+    """View of a lens for every pixel: its ray (h, w, 2) and the brightness of an even scene there (h, w)."""
 
     rays: Array
     falloff: Array
@@ -177,7 +177,7 @@ def expose(
 
 
 class Shot(NamedTuple):
-    """What a camera takes: a target by an optic, its view and exposure; the seed names the sensor's noise."""
+    """A camera's shot: a target by an optic, its view and exposure; the seed names the sensor's noise."""
 
     target: PadTarget
     optic: Optic

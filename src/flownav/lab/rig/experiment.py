@@ -46,7 +46,9 @@ LOG_S = 0.01
 
 @dataclass(frozen=True)
 class RigSettings:
-    """One experiment. The defaults are the one configuration fixed for all heights (docs/how-to/rig.md says how)."""
+    """One experiment. The defaults are the one configuration fixed for all heights (docs/how-to/rig.md describes
+    it).
+    """
 
     height_m: float = 0.6
     pivot_height_m: float = 2.1
@@ -72,7 +74,7 @@ class RigSettings:
 
 @dataclass(frozen=True)
 class RigLog:
-    """What the board logged in one run, one row every LOG_S; the columns of rig.csv."""
+    """Log of the board in one run, one row every LOG_S; the columns of rig.csv."""
 
     time_s: Array
     encoder_counts: NDArray[np.int64]
@@ -201,7 +203,7 @@ COLUMNS = {
 def write_rig_folder(log: RigLog, folder: Path, command: str = "", *, dated: bool = True) -> None:
     """Write rig.csv and rig.toml, each whole or not at all. InputError where the folder cannot be written.
 
-    dated: whether rig.toml says when it was written.
+    dated: whether rig.toml states when it was written.
     """
     table = np.column_stack([log.time_s if name == "t_s" else getattr(log, name) for name in COLUMNS])
     line = ",".join(COLUMNS.values())

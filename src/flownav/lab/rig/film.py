@@ -59,7 +59,7 @@ class Matcher(NamedTuple):
 
 
 class Film(NamedTuple):
-    """What comes of it: flow (n-1, 2) and quality (n-1)."""
+    """Flow (n-1, 2) [px] and quality (n-1) measured from the film."""
 
     flow_px: Array
     quality: NDArray[np.int64]

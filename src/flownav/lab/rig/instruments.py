@@ -1,4 +1,5 @@
-"""What the rig reads: the encoder at the pivot, and what the PX4FLOW reads beside its pictures and sends.
+"""Instruments of the rig: the encoder at the pivot, and the readings of the PX4FLOW besides its pictures, as it sends
+them.
 
 A Baumer encoder of 10 000 lines, four counts a line (paper section III.C), is sampled by the dSPACE board at 1 kHz.
 Its rate is the slope of a local cubic through 25 ms on either side, fitted afterwards, so that the reference has
@@ -29,7 +30,7 @@ SONAR_RESOLUTION_M = 1e-3
 
 
 class Messages(NamedTuple):
-    """What the sensor sent: when it arrived in the log [s] and its fields (n rows)."""
+    """Messages of the sensor: when each arrived in the log [s] and its fields (n rows)."""
 
     arrival_s: Array
     velocity_m_s: Array  # (n, 2)

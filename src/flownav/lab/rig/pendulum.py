@@ -3,7 +3,7 @@
 The pivot is l0 above the pad, the sensor hangs l = l0 - h below it, h above the pad at rest. The angle theta is
 positive towards +x. The paper's equations 13 to 15 are kept as printed (z upwards, velocities by derivative).
 
-A free swing is a near-pure tone: it tells gain and latency, no more. Rods of several lengths give several tones;
+A free swing is a near-pure tone: it determines gain and latency, no more. Rods of several lengths give several tones;
 the chirp and the steps, by a motor at the pivot, give a band.
 """
 

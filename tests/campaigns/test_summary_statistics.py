@@ -1,4 +1,4 @@
-"""Statistics on a campaign's pages: the wind's sectors and rings, rank correlations and their intervals, convergence."""
+"""Statistics on a campaign's pages: the wind's sectors and rings, rank correlations, convergence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The motion of a path: which speeds are a climb and a transit, whichever way it goes, and over how long it is asked."""
+"""The motion of a path: which speeds are a climb and a transit, whichever way it goes, and over how long."""
 
 from __future__ import annotations
 

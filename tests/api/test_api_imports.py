@@ -96,3 +96,15 @@ def test_a_log_of_csv_files_is_looked_at_with_no_more(tmp_path):
     made = str(tmp_path / "made")
     loaded_by_command("sample", "csv", "--out", made)
     assert loaded_by_command("info", f"{made}/flight-csv", of=NEVER) == set()
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import flownav.simulation.engine, flownav.parts.flying, flownav.replays.session",
+        "import flownav.cli.fly, flownav.cli.replay, flownav.cli.live, flownav.cli.bench",
+    ],
+)
+def test_benchmark_samples_and_example_parts_are_loaded_where_they_are_asked_for_alone(code):
+    apart = ("flownav.studies.benchmark.measures", "flownav.export.samples.kinds", "flownav.parts.examples")
+    assert loaded_by(code, apart) == set()

@@ -38,7 +38,7 @@ class Swapped(NamedTuple):
     kept: Somewhere
 
 
-@BOTH.on_lanes
+@BOTH.loop
 def swapped(own: Own, other: Other, *, by: float) -> Swapped:
     return Swapped(Own(other.second), Other(own.value * by, other.first), Somewhere(own.value))
 
@@ -77,4 +77,4 @@ def test_the_compiled_loop_does_the_same(buffers):
 
 def test_a_record_of_a_layout_that_is_not_known_is_refused():
     with pytest.raises(TypeError, match="is no record of this layout"):
-        BELOW.on_lanes(swapped.law)
+        BELOW.loop(swapped.law)

@@ -39,7 +39,7 @@ def test_a_records_field_has_a_row_and_a_named_one_the_row_that_was_there():
 def test_a_law_may_return_a_tuple_of_records():
     layout, work = laid_out()
 
-    @layout.on_lanes
+    @layout.loop
     def step(place: Place, count: Count, *, by_m: float) -> tuple[Place, Count]:
         """A step north, counted."""
         return Place(place.north_m + by_m, place.east_m), Count(count.count + 1.0)
@@ -63,7 +63,7 @@ def test_what_is_seen_is_computed_from_records_and_from_what_is_told():
 
     above.see(apart)
 
-    @above.on_lanes
+    @above.loop
     def go(seen: Apart) -> Place:
         """There."""
         return Place(seen.apart_m, 0.0)

@@ -172,9 +172,11 @@ def test_innovations_are_as_large_as_the_filter_says_whatever_the_gain(gain):
     settings, law = settings_of(sensor, flow_noise_stated=True)
     keys = {name: getattr(settings, name) for name in settings.model_fields_set} | {"flow_noise_time_s": 1e9}
     found = navigate(flown.changed(Sensor.FLOW_RATE, value=value), noise=law, **keys)
-    rows = found.offers[(found.offers[:, 1] == Sensor.FLOW_RATE) & (found.offers[:, 0] > 5.0)]
-    assert len(rows) > 1300
-    assert np.mean(rows[:, 5] ** 2 / rows[:, 6]) == pytest.approx(1.0, abs=0.12)
+    late = (found.offered.sensor == Sensor.FLOW_RATE) & (found.offered.t_s > 5.0)
+    assert np.count_nonzero(late) > 1300
+    assert np.mean(found.offered.innovation[late] ** 2 / found.offered.innovation_variance[late]) == pytest.approx(
+        1.0, abs=0.12
+    )
 
 
 @pytest.mark.parametrize("gain", GAINS)

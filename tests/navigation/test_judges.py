@@ -380,6 +380,10 @@ def test_the_only_range_is_believed_until_the_height_travels():
     assert not repeats(11.0, m, Height(-2.0, 0.1, 1.0), True, s)
     assert not repeats(11.0, m, Height(-2.79, 0.1, 1.0), True, s)  # 5 x 0.1 m and three standard deviations of drift
     assert repeats(11.0, m, Height(-2.81, 0.1, 1.0), True, s)
+    for lasting_s in (0.6, 2.0, 5.0):  # the drift is that of a constant speed
+        least = 0.5 + 3.0 * 0.1 * lasting_s
+        assert not repeats(10.0 + lasting_s, m, Height(-2.0 - least + 0.01, 0.1, 1.0), True, s)
+        assert repeats(10.0 + lasting_s, m, Height(-2.0 - least - 0.01, 0.1, 1.0), True, s)
 
 
 def test_pressure_height():

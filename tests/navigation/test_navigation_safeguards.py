@@ -92,8 +92,7 @@ def test_what_is_no_number_is_counted_and_never_fused(hover, sensor, bad):
     assert np.isfinite(load_imu(run.on.work, ONE_LANE, 0)).all()
     late = run.t_s > 5.0
     assert np.abs(run.error[late]).max() < 0.1
-    rows = run.offers[run.offered.sensor == sensor]
-    fused = rows[rows[:, 8] == Reason.FUSED]
+    fused = run.offers[(run.offered.sensor == sensor) & (run.offered.reason == Reason.FUSED)]
     assert np.isfinite(fused).all()
     if sensor not in (Sensor.IMU, Sensor.MAG, Sensor.ATTITUDE, Sensor.LANDED):
         assert run.reasons(sensor)["not_finite"] >= len(stream) // 2 - 1

@@ -41,7 +41,7 @@ from flownav.navigation.fault_sizes import least_size, prior_sigma
 from flownav.navigation.flags import Flag, flagged, flags_of
 from flownav.navigation.loop import run, start_navigator
 from flownav.navigation.protection import levels
-from flownav.navigation.rows import EstimateRow
+from flownav.navigation.rows import EstimateRow, InnovationRow
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.smoother import part_of
 from flownav.navigation.suspicion import EXCLUDED_SIGMAS, HELD_S
@@ -257,10 +257,10 @@ def test_a_flow_that_is_right_again_is_trusted_5_s_later():
     late = flown.streams[Sensor.FLOW_RATE].t_s >= 16.0
     value = np.where(late[:, None], flown.streams[Sensor.FLOW_RATE].value, wrong.streams[Sensor.FLOW_RATE].value)
     found = navigate(flown.changed(Sensor.FLOW_RATE, value=value))
-    flow = found.offers[found.offered.sensor == Sensor.FLOW_RATE]
-    again_s = flow[(flow[:, 0] > 16.0) & (flow[:, 8] == Reason.FUSED), 0].min()
+    flow = InnovationRow.of(found.offers[found.offered.sensor == Sensor.FLOW_RATE])
+    again_s = flow.t_s[(flow.t_s > 16.0) & (flow.reason == Reason.FUSED)].min()
     assert 20.5 < again_s < 23.0
-    assert (flow[flow[:, 0] > again_s, 8] == Reason.FUSED).all()
+    assert (flow.reason[flow.t_s > again_s] == Reason.FUSED).all()
 
 
 # -- flags --------------------------------------------------------------------------------------------------------

@@ -196,7 +196,7 @@ def heard(place: int, reason: int = FUSED, stray: float = 0.0, change: float = 0
     work[[REASON, INNOVATION, INNOVATION_VARIANCE, NOISE]] = reason, change, 2.0, 1.0
     scale_noise(work, ONE_LANE, place)
     assert work[NOISE] == pytest.approx(0.1)
-    follow_noise(work, ONE_LANE, 1.0, place, 5.0)
+    follow_noise(work, ONE_LANE, 1.0, place, gate_sigma=5.0)
     return load_noise(work, ONE_LANE, place, 0)
 
 

@@ -162,9 +162,11 @@ def test_range_spikes_and_gaps_are_ridden_out(log, flight):
     assert np.abs(error_of(run, flight))[:, :2].max() < 0.15
     assert np.abs(error_of(run, flight))[run.said.t_s > 4.0, 2].max() < 0.03
     assert len(run.written.event[EventRow.of(run.written.event).kind == 2]) == 0  # no new ground
-    rows = run.innovation[run.offered.sensor == Sensor.RANGE]
-    far = rows[(np.abs(rows[:, 5]) > 1.0) & (rows[:, 8] == Reason.FUSED)]
-    assert np.all(np.abs(far[:, 5]) < 0.6 * np.sqrt(far[:, 6]))  # what is not refused weighs little
+    offered = run.offered
+    taken = (offered.sensor == Sensor.RANGE) & (offered.reason == Reason.FUSED)
+    far, variance = (column[taken & (np.abs(offered.innovation) > 1.0)]
+                     for column in (np.abs(offered.innovation), offered.innovation_variance))  # fmt: skip
+    assert np.all(far < 0.6 * np.sqrt(variance))  # what is not refused weighs little
 
 
 def test_flow_spikes_and_lost_flow_are_ridden_out(log, flight):
@@ -206,8 +208,8 @@ def test_noisy_flow_is_believed_less(log):
     clean, noisy = flown(log), flown(with_stream(log, Sensor.FLOW_RATE, value=value))
 
     def late_variance(run):
-        rows = run.innovation[(run.offered.sensor == Sensor.FLOW_RATE) & (run.offered.t_s > 30)]
-        return np.median(rows[:, 6])
+        late = (run.offered.sensor == Sensor.FLOW_RATE) & (run.offered.t_s > 30)
+        return np.median(run.offered.innovation_variance[late])
 
     assert late_variance(noisy) > 10 * late_variance(clean)
     assert reasons(noisy, Sensor.FLOW_RATE).get("innovation_gate", 0) < 0.02 * 2 * len(stream)

@@ -11,6 +11,7 @@ from flownav.core.measurement import Sensor
 from flownav.estimation.gating import Reason
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.log import Log
+from flownav.navigation.rows import InnovationRow
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.bundle import to_record
 from flownav.replays.prepare import ReplayOptions
@@ -76,8 +77,8 @@ def test_gps_aided_velocity_agrees_with_gps_and_hardly_anything_is_rejected(outd
     velocity = run.scores()["velocity_rms_m_s"]
     assert velocity is not None
     assert velocity < 0.25
-    rows = run.innovation
-    gated = {sensor: rows[rows[:, 1] == sensor, 8] == Reason.INNOVATION_GATE for sensor in Sensor}
+    offered = InnovationRow.of(run.innovation)
+    gated = {sensor: offered.reason[offered.sensor == sensor] == Reason.INNOVATION_GATE for sensor in Sensor}
     assert sum(np.count_nonzero(gated[s]) for s in Sensor if s != Sensor.RANGE) < 50
     assert np.mean(gated[Sensor.RANGE]) < 0.005
 

@@ -11,6 +11,7 @@ from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor, Stream
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.log import Log
+from flownav.navigation.rows import EstimateRow
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import ReplayOptions, prepare, put_right
 from flownav.replays.session import replay
@@ -40,7 +41,7 @@ def test_gains_of_the_settings_are_taken_off_the_flow(flight_log):
     told = NavigatorSettingsFile(flow_gain_x=1.25, flow_gain_y=0.8)
     cut = ReplayOptions(gps_outages_s=((15.0, 30.0),))
     right, mended, unsaid = (
-        replay(log, cut, settings).estimate[:, 1:4]
+        EstimateRow.of(replay(log, cut, settings).estimate).pos_ned_m
         for log, settings in ((flight_log, NavigatorSettingsFile()), (wrong, told), (wrong, NavigatorSettingsFile()))
     )
     assert np.abs(mended - right).max() < 0.02

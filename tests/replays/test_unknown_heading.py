@@ -11,7 +11,7 @@ from flownav.core.frames import rotation_from_quaternion
 from flownav.core.measurement import Sensor
 from flownav.estimation.gating import Reason
 from flownav.logs.csv_folder import read_csv_folder
-from flownav.navigation.rows import EventRow
+from flownav.navigation.rows import EstimateRow, EventRow
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tape import COMPASS_REFUTED, HEADING_FOUND
 from flownav.replays.prepare import ReplayOptions
@@ -44,7 +44,7 @@ def turned(log, by_rad: float):
 
 
 def yaw_of(estimate: np.ndarray) -> np.ndarray:
-    rotation = rotation_from_quaternion(*estimate[:, 7:11].T)
+    rotation = rotation_from_quaternion(*EstimateRow.of(estimate).quaternion.T)
     return np.arctan2(rotation[3], rotation[0])
 
 

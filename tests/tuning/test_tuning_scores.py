@@ -10,6 +10,7 @@ import pytest
 from flownav.core.measurement import COLUMNS, Sensor, Stream
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
+from flownav.navigation.rows import InnovationRow
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import ReplayOptions
 from flownav.studies.tuning.scores import (
@@ -30,11 +31,11 @@ WINDOWS = [(0.0, 10.0), (20.0, 30.0)]
 
 def offers(news, variance, *, hz=20.0, sensor=Sensor.RANGE, reason=Reason.FUSED, start_s=0.0, component=0):
     """Rows as the navigator's tape has them."""
-    rows = np.zeros((len(news), 9))
-    rows[:, 0] = start_s + np.arange(len(news)) / hz
-    rows[:, 1], rows[:, 2], rows[:, 8] = sensor, component, reason
-    rows[:, 5], rows[:, 6] = news, variance
-    return rows
+    columns = dict.fromkeys(InnovationRow._fields, 0.0) | {
+        "t_s": start_s + np.arange(len(news)) / hz, "sensor": sensor, "component": component, "reason": reason,
+        "innovation": news, "innovation_variance": variance,
+    }  # fmt: skip
+    return np.column_stack([np.broadcast_to(column, len(news)).astype(float) for column in columns.values()])
 
 
 def density(rows, window=0, sensor=Sensor.RANGE):

@@ -17,6 +17,7 @@ from flownav.estimation.laws import component
 from flownav.estimation.laws.attitude import attitude, bridged_attitude, level
 from flownav.estimation.named import Attitude
 from flownav.estimation.states import ATTITUDE, CONSIDERS, FLOW_LAG, GYRO_BIAS, INS_ERROR, MEASURED
+from flownav.navigation import calls
 from flownav.navigation.heading import HeadingVerdict, conclude_heading, offered_heading
 from flownav.navigation.memory import LEVEL_READ, MEMORY, share, shared
 from flownav.navigation.motion_records import BridgeMemory, ImuMemory
@@ -93,14 +94,14 @@ def offered_attitude(read: Quaternion, variance: float, sound: bool) -> Attitude
     return AttitudeOffer(Offer(w, variance, FUSED if sound else SILENT), MeasuredAttitude(w, x, y, z))
 
 
-@on_lanes
+@on_lanes(calls.judge_attitude)
 def judge_attitude(reading: Reading, start: StartMemory, *, s: AttitudeSettings) -> AttitudeOffer:
     """The quaternion that was read, where no IMU serves."""
     sound, read = read_attitude(reading, start.started)
     return offered_attitude(read, s.ins_tilt_white_rad * s.ins_tilt_white_rad, sound)
 
 
-@on_lanes
+@on_lanes(calls.judge_heading)
 def judge_heading(
     reading: Reading, start: StartMemory, m: HeadingMemory, *, t_s: float, s: AttitudeSettings
 ) -> HeadingVerdict:
@@ -129,13 +130,13 @@ def take_attitude(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equ
 
 
 # -- where it puts down ---------------------------------------------------------------------------------------
-@on_lanes
+@on_lanes(calls.note_aided)
 def note_aided(aid: AidMemory) -> AidMemory:
     """Whether something horizontal was fused lately."""
     return with_aided(aid, aided=1.0 if aid.flag < 2.0 else 0.0)
 
 
-@on_lanes
+@on_lanes(calls.judge_level)
 def judge_level(reading: Reading, start: StartMemory, *, axis: int, s: AttitudeSettings) -> Offer:
     """Down by the quaternion that was read, along a body axis, in the lanes where it is one; the others are silent."""
     sound, read = read_attitude(reading, start.started)
@@ -180,7 +181,7 @@ class BridgeHead(NamedTuple):
     crossed: bool
 
 
-@on_lanes
+@on_lanes(calls.note_bridge)
 def note_bridge(
     reading: Reading, start: StartMemory, imu: ImuMemory, own: Attitude, variance: AttitudeVariance, m: BridgeMemory
 ) -> BridgeHead:
@@ -194,7 +195,7 @@ def note_bridge(
     return BridgeHead(noted if sound and not gap else m, sound and gap)
 
 
-@on_lanes
+@on_lanes(calls.judge_bridged)
 def judge_bridged(reading: Reading, start: StartMemory, imu: ImuMemory, m: BridgeMemory, *, axis: int) -> AttitudeOffer:
     """The attitude that the filter would have, had it turned over the gap as the read one did."""
     sound, read = read_attitude(reading, start.started)
@@ -205,7 +206,7 @@ def judge_bridged(reading: Reading, start: StartMemory, imu: ImuMemory, m: Bridg
     return offered_attitude(turned, before + squared(BRIDGE_SIGMA_RAD), crosses)
 
 
-@on_lanes
+@on_lanes(calls.close_gap)
 def close_gap(m: ImuMemory) -> ImuMemory:
     """No gap is open any more."""
     return with_gap(m, gap=0.0)

@@ -9,6 +9,7 @@ from flownav.estimation.covariance import consider, consider_none
 from flownav.estimation.laws.height import baro_altitude
 from flownav.estimation.named import PositionNed
 from flownav.estimation.states import ACCEL_BIAS, BARO, GROUND, POSITION, VELOCITY
+from flownav.navigation import calls
 from flownav.navigation.memory import GROUNDED
 from flownav.navigation.offers import conclude, note_height
 from flownav.navigation.packed import load_height_settings
@@ -29,7 +30,7 @@ class BaroVerdict(NamedTuple):
     offer: Offer
 
 
-@on_lanes
+@on_lanes(calls.judge_baro)
 def judge_baro(
     reading: Reading, start: StartMemory, position: PositionNed, m: BaroMemory, noise: NoiseMemory, *, s: HeightSettings
 ) -> BaroVerdict:
@@ -68,5 +69,5 @@ def take_baro(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Out
     baro_altitude(work, lanes, 0)
     conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
     consider_none(work, lanes)
-    follow_noise(work, lanes, t_s, OF_BARO, s.gate_sigma)
+    follow_noise(work, lanes, t_s, OF_BARO, gate_sigma=s.gate_sigma)
     note_height(work, lanes, t_s)

@@ -6,6 +6,7 @@ import numpy as np
 
 from flownav.core.compile import Lanes, Work, equation, procedure, replacing, squared
 from flownav.core.measurement import Sensor
+from flownav.navigation import calls
 from flownav.navigation.inertial import STEADY_S, is_possible
 from flownav.navigation.motion_records import ImuMemory
 from flownav.navigation.records import Reading, StartMemory
@@ -47,13 +48,13 @@ def felt(reading: Reading, m: StartMemory, dt_s: float) -> StartMemory:
     )
 
 
-@on_lanes
+@on_lanes(calls.waits)
 def waits(m: StartMemory) -> bool:
     """Whether any lane has not started."""
     return m.started == 0.0
 
 
-@on_lanes
+@on_lanes(calls.note_attitude)
 def note_attitude(reading: Reading, m: StartMemory, *, t_s: float) -> StartMemory:
     """The latest attitude before the start, of unit length."""
     w, x, y, z = reading.value_0, reading.value_1, reading.value_2, reading.value_3
@@ -70,7 +71,7 @@ class Levelled(NamedTuple):
     imu: ImuMemory
 
 
-@on_lanes
+@on_lanes(calls.note_force)
 def note_force(reading: Reading, m: StartMemory, imu: ImuMemory, *, t_s: float) -> Levelled:
     """The latest inertial reading before the start, and the mean specific force."""
     noted = m.started == 0.0 and reading.arrived > 0.0 and is_possible(reading)

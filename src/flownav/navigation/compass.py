@@ -14,6 +14,7 @@ from flownav.core.compile import equation, exp, replacing, smaller
 from flownav.core.frames import within_half_turn
 from flownav.estimation.named import Attitude
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE
+from flownav.navigation import calls
 from flownav.navigation.course import LEAST_TRAVEL_M, is_velocity, judge_course, turn_between, turn_heading, with_gps
 from flownav.navigation.motion_records import CourseMemory, PushMemory
 from flownav.navigation.records import HeadingMemory, Reading
@@ -82,7 +83,7 @@ def refuted(course: CourseMemory, push: PushMemory) -> tuple[bool, float]:
 
 
 # -- on lanes -----------------------------------------------------------------------------------------------
-@on_lanes
+@on_lanes(calls.note_push)
 def note_push(force: Force, m: PushMemory, *, dt_s: float) -> PushMemory:
     """The block's memory with the velocity that the step just made adds, by the filter's own heading."""
     return with_push(m, push_n=m.push_n + dt_s * force.north_m_s2, push_e=m.push_e + dt_s * force.east_m_s2)
@@ -99,7 +100,7 @@ class CompassVerdict(NamedTuple):
     refuted: Event
 
 
-@on_lanes
+@on_lanes(calls.check_compass)
 def check_compass(
     reading: Reading, heading: HeadingMemory, own: Attitude, course: CourseMemory, push: PushMemory, *, t_s: float
 ) -> CompassVerdict:

@@ -14,6 +14,7 @@ from flownav.core.compile import arctan2, cos, equation, replacing, sin
 from flownav.core.frames import heading_cosine_sine, quaternion_product, turned_level, velocity_from_flow
 from flownav.estimation.named import Attitude, rotation_by
 from flownav.estimation.states import ATTITUDE
+from flownav.navigation import calls
 from flownav.navigation.motion_records import CourseMemory
 from flownav.navigation.reasons import is_heard
 from flownav.navigation.records import HeadingMemory, Look, Reading
@@ -93,14 +94,14 @@ def turn_heading(own: Attitude, by_rad: float, turns: bool) -> tuple[Attitude, R
     )
 
 
-@on_lanes
+@on_lanes(calls.seeks)
 def seeks(m: HeadingMemory) -> bool:
     """Whether a heading is sought in any lane."""
     return m.sought > 0.0
 
 
 # -- on lanes -----------------------------------------------------------------------------------------------
-@on_lanes
+@on_lanes(calls.note_flow_course)
 def note_flow_course(
     reading: Reading, heading: HeadingMemory, look: Look, own: Attitude, m: CourseMemory, *, t_s: float,
     angular: bool, sought: bool,
@@ -125,7 +126,7 @@ class FoundHeading(NamedTuple):
     found: Event
 
 
-@on_lanes
+@on_lanes(calls.find_heading)
 def find_heading(
     reading: Reading, heading: HeadingMemory, own: Attitude, m: CourseMemory, *, t_s: float
 ) -> FoundHeading:

@@ -10,6 +10,7 @@ from flownav.estimation.covariance import consider
 from flownav.estimation.laws.flow import body_velocity, flow_rate
 from flownav.estimation.named import VelocityNed
 from flownav.estimation.states import ATTITUDE, COMPASS, FLOW_SCALE, GROUND, GYRO_BIAS, INS_ERROR, POSITION, VELOCITY
+from flownav.navigation import calls
 from flownav.navigation.fault_signs import sign_flow
 from flownav.navigation.flow_judge import (
     gyro_share,
@@ -72,7 +73,7 @@ class FlowOffer(NamedTuple):
     share: GyroShare
 
 
-@on_lanes
+@on_lanes(calls.offer_component)
 def offer_component(
     reading: Reading,
     look: Look,
@@ -111,7 +112,7 @@ def offer_component(
     )
 
 
-@on_lanes
+@on_lanes(calls.learn)
 def learn(
     tested: Tested, reading: Reading, before: FlowInnovation, m: FlowMemory, *, t_s: float, angular: bool,
     component: int, s: FlowSettings,
@@ -138,7 +139,7 @@ class Freed(NamedTuple):
     innovation: FlowInnovation
 
 
-@on_lanes
+@on_lanes(calls.free_velocity)
 def free_velocity(
     tested: Tested, look: Look, gps: GpsMemory, before: FlowInnovation, m: FlowMemory, *, t_s: float, angular: bool
 ) -> Freed:
@@ -155,7 +156,7 @@ def free_velocity(
 
 
 # -- a reading as a whole -----------------------------------------------------------------------------------
-@on_lanes
+@on_lanes(calls.walk_alone)
 def walk_alone(
     look: Look, velocity: VelocityNed, gps: GpsMemory, m: FlowMemory, *, t_s: float, s: FlowSettings
 ) -> tuple[Doubt, Doubt]:
@@ -175,7 +176,7 @@ class Agreement(NamedTuple):
     event: Event
 
 
-@on_lanes
+@on_lanes(calls.judge_agreement)
 def judge_agreement(look: Look, reading: Reading, m: FlowMemory, *, t_s: float) -> Agreement:
     """Write the event that flow is doubted, or trusted again; note when it was tested last. No other is held back."""
     if look.reason != FUSED:

@@ -6,6 +6,7 @@ import numpy as np
 
 from flownav.core.compile import cos, equation, exp, larger, replacing, smaller
 from flownav.estimation.laws import lens_range
+from flownav.navigation import calls
 from flownav.navigation.flow_noise import LONGEST_STEP_S
 from flownav.navigation.height import MANY_STRAYS
 from flownav.navigation.memory import holds
@@ -58,7 +59,7 @@ class Summed(NamedTuple):
     looks: FlowSum
 
 
-@on_lanes
+@on_lanes(calls.sum_looks)
 def sum_looks(reading: Reading, m: FlowSum, *, t_s: float) -> Summed:
     """Looks of an angular flow that are shorter than LEAST_LOOK_S are summed up to one that is not: its mean."""
     look_s = t_s - m.heard_s
@@ -113,7 +114,7 @@ def turning_of(
 
 
 # -- what was seen ------------------------------------------------------------------------------------------
-@on_lanes
+@on_lanes(calls.see_ground)
 def see_ground(
     below: GroundBelow, ranged: RangeMemory, echo: EchoMemory, ground: GroundMemory, *, t_s: float, s: FlowSettings
 ) -> Look:
@@ -137,7 +138,7 @@ def see_ground(
     )
 
 
-@on_lanes
+@on_lanes(calls.see_turning)
 def see_turning(
     reading: Reading,
     start: StartMemory,
@@ -155,7 +156,7 @@ def see_turning(
     return with_turning(look, turning_x=x, turning_y=y), after if follows else m
 
 
-@on_lanes
+@on_lanes(calls.judge_look)
 def judge_look(
     reading: Reading, start: StartMemory, heading: HeadingMemory, look: Look, *, angular: bool, s: FlowSettings
 ) -> Look:
@@ -171,7 +172,7 @@ def judge_look(
     return with_reason(look, reason=NO_HEADING if reason == FUSED and heading.sought > 0.0 else reason)
 
 
-@on_lanes
+@on_lanes(calls.judge_scale)
 def judge_scale(look: Look, gps: GpsMemory, m: FlowMemory, *, t_s: float) -> Look:
     """A flow's scale is learnt against GPS alone, and not of a flow that is doubted: without either, an error of the
     motion or noise passes for a scale, which then lasts.
@@ -179,7 +180,7 @@ def judge_scale(look: Look, gps: GpsMemory, m: FlowMemory, *, t_s: float) -> Loo
     return with_scale(look, unscaled=0.0 if holds(gps, t_s) and m.doubted == 0.0 else 1.0)
 
 
-@on_lanes
+@on_lanes(calls.hold_back)
 def hold_back(gps: GpsMemory, m: FlowMemory, *, t_s: float) -> HeldBack:
     """A flow that is wrong again and again is tested and not fused while GPS holds."""
     return HeldBack(1.0 if holds(gps, t_s) and np.isfinite(m.wrong_s) else 0.0)

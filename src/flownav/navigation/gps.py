@@ -11,6 +11,7 @@ from flownav.estimation.covariance import covariance_of, expect, states_of, vari
 from flownav.estimation.laws.gps import gps_position, gps_velocity
 from flownav.estimation.laws.still import pad_below
 from flownav.estimation.states import GPS_FAST, GPS_SLOW, GPS_VELOCITY, PAD, POSITION, STATE, VELOCITY
+from flownav.navigation import calls
 from flownav.navigation.fault_signs import sign_drift
 from flownav.navigation.memory import MEMORY
 from flownav.navigation.motion_records import SteadyForce
@@ -85,7 +86,7 @@ MEMORY.derive(AlongAxis, along_axis, "axis")
 
 
 # -- one axis of a fix ----------------------------------------------------------------------------------------
-@on_lanes
+@on_lanes(calls.judge_fix)
 def judge_fix(
     reading: Reading, start: StartMemory, m: LevelMemory, *, axis: int, position: bool, alone: bool, s: GpsSettings
 ) -> Offer:
@@ -112,13 +113,13 @@ def lag_variance(start: StartMemory, steady: SteadyForce, s: GpsSettings) -> flo
     return lag_s * lag_s * squared_acceleration(steady)
 
 
-@on_lanes
+@on_lanes(calls.add_lag)
 def add_lag(noise: Noise, start: StartMemory, steady: SteadyForce, *, s: GpsSettings) -> Noise:
     """A velocity errs the more, the more the vehicle is accelerated."""
     return Noise(noise.variance + lag_variance(start, steady, s))
 
 
-@on_lanes
+@on_lanes(calls.follow_fix_noise)
 def follow_fix_noise(
     tested: Tested, start: StartMemory, steady: SteadyForce, m: NoiseMemory,
     *, t_s: float, place: int, s: GpsSettings,
@@ -139,7 +140,7 @@ def squared_acceleration(steady: SteadyForce) -> float:
     return steady.north_m_s2 * steady.north_m_s2 + steady.east_m_s2 * steady.east_m_s2 + down_m_s2 * down_m_s2
 
 
-@on_lanes
+@on_lanes(calls.smooth_force)
 def smooth_force(steady: SteadyForce) -> Force:
     """A receiver's lag is of the motion, not of the vibration."""
     return Force(steady.north_m_s2, steady.east_m_s2, steady.down_m_s2)
@@ -197,7 +198,7 @@ class FixFate(NamedTuple):
     pad_goes: bool
 
 
-@on_lanes
+@on_lanes(calls.judge_fate)
 def judge_fate(
     tested: Tested, reading: Reading, along: AlongAxis, flow: FlowMemory, ranged: RangeMemory, memory: FixMemory,
     *, t_s: float, place: int, s: GpsSettings,
@@ -273,7 +274,7 @@ def take_gps(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Outp
             note_aid(work, lanes, t_s, o)
         elif position:
             note_height(work, lanes, t_s)
-        if judge_fate(work, lanes, t_s, state, s, axis, o):
+        if judge_fate(work, lanes, t_s, state, s, axis=axis, o=o):
             pad_below(work, lanes, axis)
             fuse_offered(work, lanes, s.gate_sigma, o)
 
@@ -281,7 +282,7 @@ def take_gps(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Outp
 @procedure
 def offer_axis(work: Work, lanes: Lanes, axis: int, position: bool, alone: bool, s: GpsSettings) -> None:
     """One axis of a fix, judged and put before its law."""
-    judge_fix(work, lanes, axis, position, alone, s)
+    judge_fix(work, lanes, axis, position, alone=alone, s=s)
     if position:
         gps_position(work, lanes, axis, s.gps_forward_m, s.gps_right_m, s.gps_below_m)
     else:

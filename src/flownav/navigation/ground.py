@@ -12,6 +12,7 @@ import numpy as np
 from flownav.core.compile import equation, larger, smaller
 from flownav.estimation.named import VelocityNed
 from flownav.estimation.states import GROUND, PAD
+from flownav.navigation import calls
 from flownav.navigation.motion_records import DriftMemory
 from flownav.navigation.told import HeightSettings, PlaceSettings
 from flownav.navigation.verdicts import Doubt, GroundBelow, on_lanes
@@ -53,7 +54,7 @@ class WalkedBelow(NamedTuple):
     walked: tuple[Doubt, Doubt, Doubt, Doubt]
 
 
-@on_lanes
+@on_lanes(calls.walk_below)
 def walk_below(
     m: DriftMemory, velocity: VelocityNed, below: GroundBelow, *, dt_s: float, height: HeightSettings,
     place: PlaceSettings,

@@ -12,6 +12,7 @@ from flownav.estimation.hypotheses import HEADING_OFF, sign_all
 from flownav.estimation.laws.attitude import heading
 from flownav.estimation.named import Attitude
 from flownav.estimation.states import ATTITUDE, INS_ERROR
+from flownav.navigation import calls
 from flownav.navigation.memory import holds
 from flownav.navigation.offers import conclude, offer_what_is_sound
 from flownav.navigation.packed import load_attitude_settings
@@ -73,7 +74,7 @@ class Weighed(NamedTuple):
     doubts: tuple[Doubt, Doubt]
 
 
-@on_lanes
+@on_lanes(calls.weigh_heading)
 def weigh_heading(
     fate: Fate, tested: Tested, gps: GpsMemory, m: HeadingMemory, *, t_s: float, gate_sigma: float
 ) -> Weighed:
@@ -110,7 +111,7 @@ def magnetic_heading(forward_n: float, forward_e: float, declination_rad: float,
     return angle
 
 
-@on_lanes
+@on_lanes(calls.judge_field)
 def judge_field(
     reading: Reading, start: StartMemory, own: Attitude, m: HeadingMemory, *, t_s: float, declination_rad: float,
     s: AttitudeSettings,
@@ -132,7 +133,7 @@ def judge_field(
     return offered_heading(t_s, read_rad, np.nan, reason if seen else SILENT, after, s)
 
 
-@on_lanes
+@on_lanes(calls.judge_yaw)
 def judge_yaw(
     reading: Reading, start: StartMemory, m: HeadingMemory, *, t_s: float, told: bool, s: AttitudeSettings
 ) -> HeadingVerdict:
@@ -153,7 +154,7 @@ def conclude_heading(work: Work, lanes: Lanes, t_s: float, sensor: int, s: Attit
     sign_all(work, lanes, HEADING_OFF, 1.0)
     offer_what_is_sound(work, lanes)
     expect(work, lanes, states_of(lanes), True)
-    weigh_heading(work, lanes, t_s, s.gate_sigma)
+    weigh_heading(work, lanes, t_s, gate_sigma=s.gate_sigma)
     conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
 
 
@@ -162,7 +163,7 @@ def take_heading(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equi
     """A magnetometer, or a heading from elsewhere."""
     s = load_attitude_settings(p)
     if sensor == Sensor.MAG:
-        judge_field(work, lanes, t_s, fitted.declination_rad, s)
+        judge_field(work, lanes, t_s, declination_rad=fitted.declination_rad, s=s)
     else:
         judge_yaw(work, lanes, t_s, fitted.heading == FROM_YAW, s)
     conclude_heading(work, lanes, t_s, sensor, s, o)

@@ -8,6 +8,7 @@ from flownav.core.compile import Lanes, Work, cos, equation, procedure, replacin
 from flownav.estimation.hypotheses import RANGE_OFFSET
 from flownav.estimation.laws.height import range_along_boresight
 from flownav.estimation.states import GROUND, POSITION
+from flownav.navigation import calls
 from flownav.navigation.motion_records import ImuMemory
 from flownav.navigation.offers import conclude, fuse_offered, weigh_strays
 from flownav.navigation.packed import load_height_settings
@@ -201,7 +202,7 @@ class RangeVerdict(NamedTuple):
     offer: Offer
 
 
-@on_lanes
+@on_lanes(calls.judge_range)
 def judge_range(
     reading: Reading, start: StartMemory, height: Height, aid: AidMemory, memory: RangingMemory, noise: NoiseMemory,
     *, t_s: float, s: HeightSettings,
@@ -243,7 +244,7 @@ class Refusal(NamedTuple):
     again: bool
 
 
-@on_lanes
+@on_lanes(calls.judge_refusal)
 def judge_refusal(
     tested: Tested, reading: Reading, height: Height, aid: AidMemory, memory: RangingMemory, imu: ImuMemory,
     *, t_s: float, s: HeightSettings,
@@ -316,7 +317,7 @@ def take_range(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Ou
     weigh_strays(work, lanes)
     conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
     watch_whiteness(work, lanes, t_s, 2)
-    follow_noise(work, lanes, t_s, OF_RANGE, s.gate_sigma)
+    follow_noise(work, lanes, t_s, OF_RANGE, gate_sigma=s.gate_sigma)
     if judge_refusal(work, lanes, t_s, s, o):  # the ground was found anew: the reading that showed it is fused
         range_along_boresight(work, lanes, 0, s.range_below_m, s.range_forward_m, s.range_right_m)
         fuse_offered(work, lanes, s.gate_sigma, o)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.compile import equation, larger, replacing
+from flownav.navigation import calls
 from flownav.navigation.motion_records import (
     ForceBlocks,
     ImuMemory,
@@ -151,7 +152,7 @@ class StepMotion(NamedTuple):
     lost: Event
 
 
-@on_lanes
+@on_lanes(calls.judge_motion)
 def judge_motion(
     reading: Reading, start: StartMemory, memory: MotionMemory, blocks: ForceBlocks, doubt: AccelFactors,
     *, t_s: float, step_s: float, heard: bool, s: ImuSettings,
@@ -207,7 +208,7 @@ def judge_motion(
     )
 
 
-@on_lanes
+@on_lanes(calls.steady_force)
 def steady_force(before: SteadyForce, force: Force, *, dt_s: float) -> SteadyForce:
     """The specific force of the step that was just made, followed."""
     share = dt_s / (STEADY_S + dt_s)
@@ -218,13 +219,13 @@ def steady_force(before: SteadyForce, force: Force, *, dt_s: float) -> SteadyFor
     )
 
 
-@on_lanes
+@on_lanes(calls.watch_force)
 def watch_force(reading: Reading, m: ForceBlocks, *, t_s: float) -> ForceBlocks:
     """The reading at hand goes into the mean force over a block, before the start as after it."""
     return followed_blocks(reading, t_s, m) if sound(reading) else m
 
 
-@on_lanes
+@on_lanes(calls.keep_imu)
 def keep_imu(reading: Reading, start: StartMemory, m: ImuMemory, *, t_s: float) -> ImuMemory:
     """The reading at hand stands for what follows, until the next."""
     return with_reading(reading, t_s, m) if sound(reading) and start.started > 0.0 else m

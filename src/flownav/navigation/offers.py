@@ -8,6 +8,7 @@ from flownav.core.compile import Lanes, Work, equation, exp, procedure, replacin
 from flownav.core.measurement import Sensor
 from flownav.estimation.covariance import expect, settle, states_of
 from flownav.estimation.hypotheses import weigh
+from flownav.navigation import calls
 from flownav.navigation.journal import note_correction
 from flownav.navigation.memory import CLOCK, NEWEST_OF_SENSOR, share, shared
 from flownav.navigation.reasons import (
@@ -42,7 +43,7 @@ class LeftBehind(NamedTuple):
     noise: Noise
 
 
-@on_lanes
+@on_lanes(calls.leave_behind)
 def leave_behind(reading: Reading, *, reason: int) -> LeftBehind:
     """Note of a reading only that it came and why it is not taken."""
     return LeftBehind(Fate(reason if reading.arrived > 0.0 else SILENT), Observation(reading.value_0), Noise(np.nan))
@@ -71,7 +72,7 @@ def too_old(work: Work, lanes: Lanes, t_s: float, sensor: int, o: Output) -> boo
 
 
 # -- one component ----------------------------------------------------------------------------------------
-@on_lanes
+@on_lanes(calls.observe_innovation)
 def observe_innovation(tested: Tested) -> Observation:
     """Write the difference that a law finds as the observation of an attitude."""
     return Observation(tested.innovation)
@@ -87,13 +88,13 @@ def conclude(work: Work, lanes: Lanes, t_s: float, sensor: int, component: int, 
     write_offer(work, lanes, t_s, sensor, component, o)
 
 
-@on_lanes
+@on_lanes(calls.offer_what_is_sound)
 def offer_what_is_sound(fate: Fate) -> Offered:
     """Offered to the filter where the judge found nothing against it."""
     return Offered(1.0 if fate.reason == FUSED else 0.0)
 
 
-@on_lanes
+@on_lanes(calls.note_refusal)
 def note_refusal(fate: Fate, tested: Accepted) -> Fate:
     """INNOVATION_GATE where the offer was not fused."""
     return Fate(INNOVATION_GATE if fate.reason == FUSED and tested.accepted == 0.0 else fate.reason)
@@ -118,7 +119,7 @@ def gate_ratio(tested: Tested, gate_sigma: float) -> float:
     return tested.innovation * tested.innovation / (gate_sigma * gate_sigma * tested.total)
 
 
-@on_lanes
+@on_lanes(calls.compare_level)
 def compare_level(tested: Tested, m: LevelMemory, *, axis: int, gate_sigma: float) -> LevelMemory:
     """The largest test ratio of the components of a place, once all are compared; 0 where none can be offered."""
     before = m.ratio if axis > 0 else 0.0
@@ -154,13 +155,13 @@ class Strays(NamedTuple):
     any: bool
 
 
-@on_lanes
+@on_lanes(calls.look_for_strays)
 def look_for_strays(echo: EchoMemory) -> Strays:
     """Whether strays are so frequent that a range must be weighed."""
     return Strays(Offered(0.0), echo.stray > FEW_STRAYS)
 
 
-@on_lanes
+@on_lanes(calls.weighed_range)
 def weighed_range(tested: Tested, echo: EchoMemory) -> Noise:
     """The variance of a range among strays."""
     weighed = stray_variance(tested.innovation, tested.total, tested.variance, echo.stray)
@@ -183,7 +184,7 @@ class Aided(NamedTuple):
     again: Event
 
 
-@on_lanes
+@on_lanes(calls.note_aid)
 def note_aid(fate: Fate, aid: AidMemory, *, t_s: float) -> Aided:
     """Something horizontal was fused in the lanes whose reason is FUSED."""
     fused = fate.reason == FUSED
@@ -191,7 +192,7 @@ def note_aid(fate: Fate, aid: AidMemory, *, t_s: float) -> Aided:
     return Aided(with_aid(aid, aided_s=t_s, flag=0.0) if fused else aid, again)
 
 
-@on_lanes
+@on_lanes(calls.note_height)
 def note_height(fate: Fate, aid: AidMemory, *, t_s: float) -> AidMemory:
     """The memory after something other than the range measured the height, in the lanes whose reason is FUSED."""
     return with_height(aid, height_s=t_s if fate.reason == FUSED else aid.height_s)
@@ -205,7 +206,7 @@ class AidAge(NamedTuple):
     invalid: Event
 
 
-@on_lanes
+@on_lanes(calls.note_aid_age)
 def note_aid_age(aid: AidMemory, *, t_s: float, s: AidSettings) -> AidAge:
     """Dead reckoning, and then an invalid position, where no horizontal aid has been fused for long.
 

@@ -11,6 +11,7 @@ from flownav.estimation.laws.pad import pad_fix
 from flownav.estimation.laws.still import pad_below, position_itself, velocity_itself
 from flownav.estimation.named import Attitude, PositionNed, VelocityNed, rotation_by
 from flownav.estimation.states import MEASURED, PAD, STATE
+from flownav.navigation import calls
 from flownav.navigation.memory import MEMORY
 from flownav.navigation.motion_records import ImuMemory, SeenWindow, StandMemory
 from flownav.navigation.offers import compare_level, conclude, fuse_offered, judged_whole, note_aid, note_height
@@ -83,7 +84,7 @@ def pad_at(north_m: float, east_m: float, down_m: float, goes: bool) -> tuple[Re
 
 
 # -- an external position -----------------------------------------------------------------------------------
-@on_lanes
+@on_lanes(calls.judge_pose)
 def judge_pose(
     reading: Reading, start: StartMemory, m: LevelMemory, *, axis: int, alone: bool, s: PlaceSettings
 ) -> Offer:
@@ -152,7 +153,7 @@ class FoundPad(NamedTuple):
     found: Event
 
 
-@on_lanes
+@on_lanes(calls.find_pad)
 def find_pad(
     reading: Reading, start: StartMemory, position: PositionNed, attitude: Attitude, m: PadMemory, *, s: PlaceSettings
 ) -> FoundPad:
@@ -178,7 +179,7 @@ class PadOffer(NamedTuple):
     sight: Sight
 
 
-@on_lanes
+@on_lanes(calls.judge_sight)
 def judge_sight(
     reading: Reading, start: StartMemory, velocity: VelocityNed, m: ImuMemory, fix: LevelMemory,
     *, component: int, alone: bool, s: PlaceSettings,
@@ -193,7 +194,7 @@ def judge_sight(
     return PadOffer(Offer(value, variance, judged), Sight(reading.value_0, reading.value_1, reading.value_2))
 
 
-@on_lanes
+@on_lanes(calls.count_refusals)
 def count_refusals(fate: Fate, m: PadMemory) -> PadMemory:
     """A pad that the camera sees elsewhere, fix after fix, is not where it was first seen: the next fix finds it anew.
 
@@ -241,19 +242,19 @@ def is_aloft(seen: SeenWindow, m: StandMemory) -> bool:
     return range_m > ALOFT_M or larger(seen.gps_m_s, m.gps_m_s) >= RESTING_GPS_M_S or flow_m_s >= RESTING_FLOW_M_S
 
 
-@on_lanes
+@on_lanes(calls.disbelieve_landed)
 def disbelieve_landed(reading: Reading, seen: SeenWindow, m: StandMemory) -> Reading:
     """The reading, not landed where the vehicle flies, whatever it reports."""
     return with_landing(reading, value_0=0.0 if is_aloft(seen, m) else reading.value_0)
 
 
-@on_lanes
+@on_lanes(calls.note_landed)
 def note_landed(reading: Reading, aid: AidMemory) -> AidMemory:
     """The memory of whether the vehicle is on the ground, by the newest report."""
     return with_landed(aid, landed=reading.value_0 if reading.arrived > 0.0 else aid.landed)
 
 
-@on_lanes
+@on_lanes(calls.judge_landed)
 def judge_landed(
     reading: Reading, start: StartMemory, seen: SeenWindow, m: StandMemory, *, variance: float
 ) -> Offer:  # fmt: skip
@@ -271,7 +272,7 @@ class Standing(NamedTuple):
     stands: bool
 
 
-@on_lanes
+@on_lanes(calls.stand_on_pad)
 def stand_on_pad(
     reading: Reading, start: StartMemory, position: PositionNed, pad: Pad, m: PadMemory, *, t_s: float
 ) -> Standing:
@@ -296,7 +297,7 @@ def stand_on_pad(
     )
 
 
-@on_lanes
+@on_lanes(calls.tie_to_pad)
 def tie_to_pad(reading: Reading, m: PadMemory) -> Offer:
     """The vehicle is where its pad is."""
     on_it = m.known == STOOD_ON and reading.arrived > 0.0

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from flownav.core.compile import ONE_LANE, equation, kernel, larger, pointer, replacing, smaller
 from flownav.core.measurement import Array
 from flownav.estimation.states import ATTITUDE, VELOCITY
+from flownav.navigation import calls
 from flownav.navigation.inertial import size_of, sound
 from flownav.navigation.memory import MEMORY, READING, load_imu, load_spike, new_work, store_imu, store_spike
 from flownav.navigation.motion_records import ImuMemory, SpikeMemory
@@ -141,7 +142,7 @@ class SpikeVerdict(NamedTuple):
 MEMORY.name(Arrived, READING + Reading._fields.index("arrived"))
 
 
-@on_lanes
+@on_lanes(calls.drop_spikes)
 def drop_spikes(reading: Reading, start: StartMemory, m: ImuMemory, before: SpikeMemory, *, t_s: float) -> SpikeVerdict:
     """A spike did not arrive."""
     judged = sound(reading) and np.isfinite(m.read_s) and start.started > 0.0

@@ -12,6 +12,7 @@ from flownav.estimation.hypotheses import begin_lane_anew
 from flownav.estimation.laws import component
 from flownav.estimation.named import Attitude, PositionNed, rotation_by
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, MOST_HYPOTHESES, POSITION, RATE, VELOCITY
+from flownav.navigation import calls
 from flownav.navigation.before_start import waits
 from flownav.navigation.course import with_sought
 from flownav.navigation.lagged_flow import start_lag
@@ -71,7 +72,7 @@ def noise_of_mean(m: StartMemory) -> float:
     return squared(HOVERING_M_S2) + m.shaken / larger(m.readings, 1.0)
 
 
-@on_lanes
+@on_lanes(calls.runs)
 def runs(m: StartMemory) -> bool:
     """Whether any lane has started."""
     return m.started > 0.0
@@ -99,7 +100,7 @@ def starts(reading: Reading, m: StartMemory, t_s: float, sensor: int, deadline_s
     return waiting and (has_fix(reading, sensor) or (heard and (other or stands) and t_s >= deadline_s))
 
 
-@on_lanes
+@on_lanes(calls.any_starts)
 def any_starts(reading: Reading, m: StartMemory, *, t_s: float, sensor: int, deadline_s: float) -> bool:
     """Whether any lane starts now."""
     return starts(reading, m, t_s, sensor, deadline_s)
@@ -219,7 +220,7 @@ class Beginning(NamedTuple):
     told: Event
 
 
-@on_lanes
+@on_lanes(calls.start_lanes)
 def start_lanes(
     reading: Reading, m: StartMemory, aid: AidMemory, heading: HeadingMemory, *, t_s: float, sensor: int,
     fitted: Equipment, bias_sigma: float, rectified: float,
@@ -256,17 +257,17 @@ def start_lanes(
 @procedure
 def try_start(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p: Work, o: Output) -> bool:
     """Start the lanes that can start. Whether any lane runs."""
-    if waits(work, lanes) and any_starts(work, lanes, t_s, sensor, fitted.deadline_s):
+    if waits(work, lanes) and any_starts(work, lanes, t_s, sensor, deadline_s=fitted.deadline_s):
         start_lanes(
             work,
             lanes,
             t_s,
             sensor,
             fitted,
-            p[START_SIGMA + ACCEL_BIAS],
-            load_imu_settings(p).vibration_rectified_share,
-            p,
-            o,
+            bias_sigma=p[START_SIGMA + ACCEL_BIAS],
+            rectified=load_imu_settings(p).vibration_rectified_share,
+            p=p,
+            o=o,
         )
     return bool(runs(work, lanes))
 

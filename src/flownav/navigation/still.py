@@ -15,6 +15,7 @@ from flownav.core.compile import Lanes, Work, equation, larger, procedure, small
 from flownav.estimation.covariance import consider_none
 from flownav.estimation.laws.still import gyro_at_rest, velocity_itself
 from flownav.estimation.states import ACCEL_BIAS, GYRO_BIAS, VELOCITY
+from flownav.navigation import calls
 from flownav.navigation.memory import HOLD_CLOCK, STILL_CLOCK, share, shared
 from flownav.navigation.motion_records import ImuMemory, ImuWindow, SeenWindow, StandMemory
 from flownav.navigation.offers import fuse_offered, note_aid
@@ -66,7 +67,7 @@ class Stand(NamedTuple):
     any: bool
 
 
-@on_lanes
+@on_lanes(calls.judge_stand)
 def judge_stand(start: StartMemory, gyro: ImuWindow, seen: SeenWindow, m: StandMemory) -> Stand:
     """State of motion in the window, and the range where the vehicle rests."""
     does = judge_standing(gyro, seen, m.contact_m, m.last_m)
@@ -122,7 +123,7 @@ class Rest(NamedTuple):
     offer: Offer
 
 
-@on_lanes
+@on_lanes(calls.offer_rest)
 def offer_rest(
     start: StartMemory, seen: SeenWindow, m: StandMemory, velocity: AxisVelocity, imu: ImuMemory, *, axis: int,
     s: PlaceSettings,
@@ -172,7 +173,7 @@ class Taught(NamedTuple):
     offer: Offer
 
 
-@on_lanes
+@on_lanes(calls.offer_bias)
 def offer_bias(
     start: StartMemory, gyro: ImuWindow, seen: SeenWindow, m: StandMemory, bias: AxisBias, *, axis: int
 ) -> Taught:
@@ -193,7 +194,7 @@ def offer_bias(
     )
 
 
-@on_lanes
+@on_lanes(calls.stands_still)
 def stands_still(start: StartMemory, seen: SeenWindow, m: StandMemory) -> Anywhere:
     """Whether any lane stood at the last window's end, or has the ground below it."""
     return Anywhere((m.does > MOVES or is_down(m, seen)) and start.started > 0.0)

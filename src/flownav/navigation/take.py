@@ -90,7 +90,7 @@ def receive(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment
         if heard:
             drop_spikes(work, lanes, t_s, o)
         step_s = t_s - shared(work, lanes, CLOCK)
-        judge_motion(work, lanes, t_s, step_s, heard, load_imu_settings(p), o)
+        judge_motion(work, lanes, t_s, step_s=step_s, heard=heard, s=load_imu_settings(p), o=o)
 
 
 @equation
@@ -176,7 +176,7 @@ def take(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p
     elif sensor == Sensor.FLOW_RATE or sensor == Sensor.FLOW_VELOCITY:
         take_flow(work, lanes, lagged(lanes), t_s, sensor, fitted.flow_gyro_is_imu, p, o)
         if fitted.heading == NO_HEADING or fitted.use_imu:
-            note_flow_course(work, lanes, t_s, sensor == Sensor.FLOW_RATE, fitted.heading == NO_HEADING)
+            note_flow_course(work, lanes, t_s, sensor == Sensor.FLOW_RATE, sought=fitted.heading == NO_HEADING)
     elif sensor == Sensor.RANGE:
         take_range(work, lanes, t_s, sensor, p, o)
     elif sensor == Sensor.BARO:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.compile import Lanes, Work, clamp, equation, exp, larger, replacing
+from flownav.navigation import calls
 from flownav.navigation.memory import MEMORY, holds, load_whiteness
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE
 from flownav.navigation.records import EchoMemory, GpsMemory, NoiseMemory, RangeMemory, WhitenessMemory
@@ -72,7 +73,7 @@ def followed_factor(t_s: float, m: WhitenessMemory) -> WhitenessMemory:
     return with_factor(after, factor=clamp(factor, LEAST_FACTOR, LARGEST_FACTOR))
 
 
-@on_lanes
+@on_lanes(calls.watch_whiteness)
 def watch_whiteness(
     tested: Tested, echo: EchoMemory, gps: GpsMemory, m: WhitenessMemory, *, t_s: float, axis: int
 ) -> WhitenessMemory:
@@ -135,13 +136,13 @@ def followed_noise(
     return NoiseMemory(clamp(factor, smallest, LARGEST_NOISE), innovation, t_s, m.readings + 1.0)
 
 
-@on_lanes
+@on_lanes(calls.scale_noise)
 def scale_noise(noise: Noise, m: NoiseMemory) -> Noise:
     """Before the test: the noise of the component of a place, as it was followed."""
     return Noise(noise.variance * m.factor)
 
 
-@on_lanes
+@on_lanes(calls.follow_noise)
 def follow_noise(
     tested: Tested, echo: EchoMemory, m: NoiseMemory, *, t_s: float, place: int, gate_sigma: float
 ) -> NoiseMemory:

@@ -8,6 +8,7 @@ range or flow would be used again.
 
 from flownav.core.compile import Lanes, Work, equation, procedure, squared
 from flownav.estimation.laws.attitude import level
+from flownav.navigation import calls
 from flownav.navigation.attitude import AttitudeVariance
 from flownav.navigation.offers import fuse_offered, observe_innovation
 from flownav.navigation.reasons import FUSED, SILENT
@@ -24,13 +25,13 @@ def is_lost(start: StartMemory, variance: AttitudeVariance) -> bool:
     return start.started > 0.0 and variance.about_n + variance.about_e > squared(LOST_TILT_RAD)
 
 
-@on_lanes
+@on_lanes(calls.is_tilt_lost)
 def is_tilt_lost(start: StartMemory, variance: AttitudeVariance) -> Anywhere:
     """Whether any lane does not know how it is tilted."""
     return Anywhere(is_lost(start, variance))
 
 
-@on_lanes
+@on_lanes(calls.offer_level)
 def offer_level(start: StartMemory, variance: AttitudeVariance) -> Offer:
     """It flies level, more or less."""
     return Offer(0.0, squared(USUAL_TILT_RAD), FUSED if is_lost(start, variance) else SILENT)

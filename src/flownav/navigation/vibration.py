@@ -11,6 +11,7 @@ import numpy as np
 
 from flownav.core.compile import clamp, equation, larger, replacing, smaller, squared
 from flownav.estimation.states import ACCEL_BIAS, GROUND, POSITION, VELOCITY
+from flownav.navigation import calls
 from flownav.navigation.motion_records import ForceBlocks, ImuMemory, MotionStep
 from flownav.navigation.records import Reading, StartMemory
 from flownav.navigation.tape import IMU_DOUBTED
@@ -142,7 +143,7 @@ class Shaken(NamedTuple):
     doubts: tuple[Doubt, Doubt, Doubt, Doubt, Doubt, Doubt, Doubt, Doubt, Doubt]
 
 
-@on_lanes
+@on_lanes(calls.add_vibration_noise)
 def add_vibration_noise(
     m: ImuMemory, start: StartMemory, step: MotionStep, factor: AccelFactors, *, dt_s: float, s: ImuSettings
 ) -> Shaken:
@@ -179,7 +180,7 @@ def add_vibration_noise(
     )
 
 
-@on_lanes
+@on_lanes(calls.limit_biases)
 def limit_biases(m: ImuMemory, start: StartMemory, factor: AccelFactors, b: Biases, *, s: ImuSettings) -> Biases:
     """Both biases held to what such sensors, and this vibration, can make: the last resort."""
     beyond = vibration_beyond(m, s)

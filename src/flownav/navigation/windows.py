@@ -6,6 +6,7 @@ import numpy as np
 
 from flownav.core.compile import equation, larger, replacing, smaller, squared
 from flownav.estimation.laws import component
+from flownav.navigation import calls
 from flownav.navigation.inertial import sound
 from flownav.navigation.motion_records import ImuWindow, SeenWindow
 from flownav.navigation.reasons import is_heard
@@ -141,26 +142,26 @@ class Windows(NamedTuple):
     seen: SeenWindow
 
 
-@on_lanes
+@on_lanes(calls.open_windows)
 def open_windows() -> Windows:
     """Windows in which nothing has been read."""
     return Windows(NO_READINGS, NOTHING_SEEN)
 
 
-@on_lanes
+@on_lanes(calls.watch_imu)
 def watch_imu(reading: Reading, m: ImuWindow) -> ImuWindow:
     """The inertial reading at hand goes into the window."""
     return with_imu(reading, m) if sound(reading) else m
 
 
-@on_lanes
+@on_lanes(calls.watch_range)
 def watch_range(reading: Reading, m: SeenWindow) -> SeenWindow:
     """A range goes into the window, whatever the filter makes of it; many sensors report 0 for no data."""
     ranged = is_heard(reading) and reading.value_0 > 0.0 and np.isfinite(reading.value_0)
     return with_range(reading.value_0, m) if ranged else m
 
 
-@on_lanes
+@on_lanes(calls.watch_gps_velocity)
 def watch_gps_velocity(reading: Reading, m: SeenWindow) -> SeenWindow:
     """The fastest level velocity of a receiver stays in the window."""
     speed_m_s = np.sqrt(squared(reading.value_0) + squared(reading.value_1))
@@ -168,7 +169,7 @@ def watch_gps_velocity(reading: Reading, m: SeenWindow) -> SeenWindow:
     return with_gps(m, gps_m_s=larger(m.gps_m_s, speed_m_s)) if told else m
 
 
-@on_lanes
+@on_lanes(calls.watch_flow)
 def watch_flow(reading: Reading, look: Look, m: SeenWindow, *, angular: bool) -> SeenWindow:
     """The flow's velocity by the latest range goes into the window."""
     x = reading.value_0 - (look.turning_x if angular else 0.0)

@@ -18,10 +18,10 @@ class Carriage(NamedTuple):
     """A sensor's loops over lanes; start and heard are None where it has none."""
 
     sensor: CarriedSensor
-    draw: OnLanes
-    start: OnLanes | None
-    read: OnLanes
-    heard: OnLanes | None
+    draw: OnLanes[..., Any]
+    start: OnLanes[..., Any] | None
+    read: OnLanes[..., Any]
+    heard: OnLanes[..., Any] | None
 
 
 @equation
@@ -33,9 +33,9 @@ def punctual(work: Work, lanes: Lanes, lane: int) -> Late:
 def carriage_of(sensor: CarriedSensor) -> Carriage:
     """The loops of one sensor. TypeError where a law of its row takes what is no record."""
     own, before = records_of(sensor, starting=False), records_of(sensor, starting=True)
-    start = before.on_lanes(sensor.start) if sensor.start else None
-    heard = own.on_lanes(sensor.heard) if sensor.heard else None
-    return Carriage(sensor, before.on_lanes(sensor.draw), start, own.on_lanes(sensor.step), heard)
+    start = before.loop(sensor.start) if sensor.start else None
+    heard = own.loop(sensor.heard) if sensor.heard else None
+    return Carriage(sensor, before.loop(sensor.draw), start, own.loop(sensor.step), heard)
 
 
 def records_of(sensor: CarriedSensor, *, starting: bool) -> Layout:
@@ -97,7 +97,7 @@ def taken_now(epoch: int, slot: int, sensor: int, channel: int, clock: Clock) ->
     return Taken(epoch, epoch * EPOCH_S, slot, sensor, channel, epoch // clock.every)
 
 
-def called(run: OnLanes) -> str:
+def called(run: OnLanes[..., Any]) -> str:
     """The arguments of a loop over lanes, each by its own name."""
     return ", ".join(inspect.signature(run).parameters)
 

@@ -18,6 +18,7 @@ from flownav.sensors.flow import FlowParameters, FlowState, misread, step_flow
 from flownav.sensors.geometry import Ground, ground_height
 from flownav.sensors.gps_ins import GpsInsErrors, attitude_with_error
 from flownav.sensors.range_sensor import slant_range
+from flownav.simulation import calls
 from flownav.simulation.block import Block, Progress
 from flownav.simulation.carriage import INERTIAL_FAULT, read_inertial
 from flownav.simulation.failing import Taken, strike
@@ -42,7 +43,7 @@ from flownav.vehicle.state import Around, Controls, HelicopterState
 over_home = replacing(Estimate, "pos_n", "pos_e", "pos_d")
 
 
-@PLANT.on_lanes
+@PLANT.on_lanes(calls.estimate_for_autopilot)
 def estimate_for_autopilot(state: HelicopterState, said: Estimated, felt: Felt, *, on_truth: bool) -> Estimate:
     """The outer loop's feedback: the filter's estimate or the truth, and the specific force read by the IMU."""
     return Estimate(
@@ -66,7 +67,7 @@ def note_home(work: Work, lanes: Lanes, epoch: int, reference: Reference, flight
         put_home(work, lanes, reference)
 
 
-@PLANT.on_lanes
+@PLANT.on_lanes(calls.put_home)
 def put_home(estimate: Estimate, *, reference: Reference) -> Home:
     """Where the estimate puts the pad, if the vehicle is at the reference of its path."""
     return Home(estimate.pos_n - reference.pos_n, estimate.pos_e - reference.pos_e, estimate.pos_d - reference.pos_d)
@@ -80,11 +81,11 @@ def command(
     may_fly = 1.0 if t_s >= flight.plan.takeoff_at_s else 0.0
     may_land = 1.0 if t_s >= flight.plan.may_land_after_s else 0.0
     threshold_n = CONTACT_SHARE * flight.vehicle.mass_kg * flight.vehicle.gravity_m_s2
-    mind_skids(work, lanes, may_fly, may_land, threshold_n, onboard)
+    mind_skids(work, lanes, may_fly, may_land=may_land, threshold_n=threshold_n, onboard=onboard)
     follow_path(work, lanes, may_land, reference, flight.gains, flight.learns)
 
 
-@PLANT.on_lanes
+@PLANT.on_lanes(calls.mind_skids)
 def mind_skids(
     before: AutopilotState, loads: Loads, skids: Landed, *, may_fly: float, may_land: float, threshold_n: float,
     onboard: Onboard | None,
@@ -94,7 +95,7 @@ def mind_skids(
     return landing_logic(before, contact_n, threshold_n, may_fly, may_land, EPOCH_S)
 
 
-@PLANT.on_lanes
+@PLANT.on_lanes(calls.follow_path)
 def follow_path(
     before: AutopilotState, estimate: Estimate, home: Home, said: Estimated, known: Knowledge, loops: LoopGains, *,
     may_land: float, reference: Reference, gains: AutopilotGains, learns: Told | None,
@@ -109,7 +110,7 @@ def follow_path(
     return outer_loop(before, reference, relative, known, rotation, told, may_land, EPOCH_S)
 
 
-@PLANT.on_lanes
+@PLANT.on_lanes(calls.note_inputs)
 def note_inputs(autopilot: AutopilotState, controls: Controls, *, gains: AutopilotGains) -> PaperInput:
     """U of the paper's filter: collective and pedal as perturbations from trim; zero where the skids touch."""
     flying = autopilot.flying > 0.0 and autopilot.contact_time_s == 0.0
@@ -136,7 +137,7 @@ class Steered(NamedTuple):
     stir: Stir
 
 
-@PLANT.on_lanes
+@PLANT.on_lanes(calls.steer_blades)
 def steer_blades(
     state: HelicopterState, before: AutopilotState, errors: GpsInsErrors, error: AttitudeError, loops: LoopGains,
     stir: Stir, around: Around, controls: Controls, *,
@@ -189,7 +190,7 @@ def pedal_sideways(state: AutopilotState, gains: AutopilotGains, linear: LinearT
     return gains.pedal_trim_rad + GRAVITY_M_S2 * (state.roll_sine - gains.roll_trim_sine) / linear.lateral_per_pedal
 
 
-@PAPERS.on_lanes
+@PAPERS.on_lanes(calls.follow_flow)
 def follow_flow(
     state: HelicopterState, before: FlowState, flow: FlowParameters, ground: Ground, vehicle: VehicleParameters,
     loads: Loads, *, lens_below_cg_m: float,
@@ -268,11 +269,11 @@ def hear(b: Block, onboard: Onboard, table: Timetable, epoch: int, at: Progress,
     if fails is not None:
         t_s = epoch * EPOCH_S + (part + 1) * onboard.inertial_steps * PHYSICS_S
         strike(work, lanes, b.seed, b.first, Taken(epoch, t_s, slot, Sensor.IMU, INERTIAL_FAULT + 3 * part, 0))
-    keep_inertial(work, lanes, slot, inertial_row(at.heard + part, period_s, table))
-    feel(work, lanes, part, inertial_parts(onboard), slot)
+    keep_inertial(work, lanes, slot, inertial_row=inertial_row(at.heard + part, period_s, table))
+    feel(work, lanes, part, parts=inertial_parts(onboard), slot=slot)
 
 
-@PLANT.on_lanes
+@PLANT.on_lanes(calls.feel)
 def feel(before: Felt, reading: Reading, *, part: int, parts: int) -> Felt:
     """The mean of the accelerometer's readings of this epoch with the one in a slot, the `part`-th of `parts`.
 

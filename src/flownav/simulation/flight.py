@@ -19,7 +19,7 @@ from flownav.estimation import paper_filter
 from flownav.estimation.paper_filter import STATES, PaperModel, start
 from flownav.navigation.tape import output_of
 from flownav.sensors.gps_ins import NavSolution
-from flownav.simulation import layout, navigating
+from flownav.simulation import calls, layout, navigating
 from flownav.simulation.block import Aboard, Block, Buffers, Progress, key_lanes, put_start
 from flownav.simulation.carriage import draw_units, sample, start_onboard
 from flownav.simulation.epoch import (
@@ -150,12 +150,14 @@ def decide_navigated(
     ahead = ahead if at.heard >= ahead else at.heard
     navigating.carry_ahead(work, nav, lanes, at.heard, ahead, onboard.inertial_steps * PHYSICS_S, table)
     reached, then = epoch >= table.horizon_epochs, navigating.truth_row(epoch - table.horizon_epochs, table)
-    navigating.compare_at_horizon(work, lanes, reached, nav, then)
+    navigating.compare_at_horizon(work, lanes, reached, nav=nav, truth_row=then)
     navigating.note_normalised_error(work, nav, lanes, reached, then)
     if flight.plan.along_truth:
-        navigating.put_on_truth(work, lanes, reached, nav, then)
+        navigating.put_on_truth(work, lanes, reached, nav=nav, truth_row=then)
     navigating.note_knowledge(work, lanes, nav)
-    navigating.hand_to_autopilot(work, lanes, t_s < flight.plan.handover_s, flight.plan.home_at_start, reference, nav)
+    navigating.hand_to_autopilot(
+        work, lanes, t_s < flight.plan.handover_s, at_start=flight.plan.home_at_start, reference=reference, nav=nav
+    )
     estimate_for_autopilot(work, lanes, flight.plan.fly_on_truth)
     learn(work, lanes, epoch, flight.gains, flight.learns)
     command(work, lanes, t_s, reference, flight, onboard)
@@ -242,7 +244,7 @@ def start_filter(work: Work, lanes: Lanes, variance: NDArray[np.float64], start_
     start_position(work, lanes, start_known)
 
 
-@PLANT.on_lanes
+@PLANT.on_lanes(calls.start_position)
 def start_position(x: PaperState, state: HelicopterState, measured: Measured, *, start_known: bool) -> PaperState:
     """The filter's state at the known start, or at the first GPS position."""
     return at_position(
@@ -280,7 +282,7 @@ class Stated(NamedTuple):
     spread: Spread
 
 
-@PLANT.on_lanes
+@PLANT.on_lanes(calls.say_state)
 def say_state(said: Estimated, x: PaperState, variance: PaperVariance) -> Stated:
     """The estimate is the state."""
     estimated = with_motion(
@@ -290,7 +292,7 @@ def say_state(said: Estimated, x: PaperState, variance: PaperVariance) -> Stated
     return Stated(estimated, Spread(*variance))
 
 
-@PLANT.on_lanes
+@PLANT.on_lanes(calls.say_ins_attitude)
 def say_ins_attitude(said: Estimated, gps: NavSolution) -> Estimated:
     """A filter without an attitude of its own reports the INS's."""
     return with_attitude(said, qw=gps.qw, qx=gps.qx, qy=gps.qy, qz=gps.qz)

@@ -30,7 +30,7 @@ from flownav.control.learnt_gains import judged, shaped
 from flownav.control.learnt_model import Told
 from flownav.core.compile import Lanes, Work, equation, magnitude, procedure
 from flownav.core.frames import rotation_from_quaternion
-from flownav.simulation import layout
+from flownav.simulation import calls, layout
 from flownav.simulation.layout import PLANT
 from flownav.simulation.plan import ATTITUDE_STEPS
 from flownav.simulation.records import Estimated, Home
@@ -53,7 +53,7 @@ class Minded(NamedTuple):
     autopilot: AutopilotState
 
 
-@PLANT.on_lanes
+@PLANT.on_lanes(calls.mind)
 def mind(
     before: Learnt, autopilot: AutopilotState, said: Estimated, home: Home, known: Knowledge, *, gains: AutopilotGains,
     passed: int,

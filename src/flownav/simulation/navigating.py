@@ -18,7 +18,7 @@ from flownav.estimation.named import Attitude, PositionNed, VelocityNed
 from flownav.navigation.memory import load_reading, load_start, store_reading
 from flownav.navigation.now import Carried, carried, coasted, state_of
 from flownav.navigation.records import GroundMemory, Reading, StartMemory, SuspicionMemory
-from flownav.simulation import records
+from flownav.simulation import calls, records
 from flownav.simulation.block import Aboard
 from flownav.simulation.layout import FIELDS, PLANT, ROWS, load_inertial_then, load_slot, store_estimated, store_row
 from flownav.simulation.said import GroundSaid, PadSaid, PadVariance, StatedVariance, on_both
@@ -103,7 +103,7 @@ def feed_due(work: Work, lanes: Lanes, epoch: int, following: int, aboard: Aboar
 
 
 # -- the truth at the horizon -----------------------------------------------------------------------------------
-@PLANT.on_lanes
+@PLANT.on_lanes(calls.note_truth)
 def note_truth(state: HelicopterState) -> records.TruthThen:
     """The truth of this instant."""
     rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
@@ -123,7 +123,7 @@ class Compared(NamedTuple):
     stated: records.Spread
 
 
-@on_both
+@on_both(calls.compare_at_horizon)
 def compare_at_horizon(
     start: StartMemory, position: PositionNed, velocity: VelocityNed, attitude: Attitude, stated: StatedVariance,
     then: records.TruthThen, *, reached: bool,
@@ -165,7 +165,7 @@ class OnTruth(NamedTuple):
     attitude: Attitude
 
 
-@on_both
+@on_both(calls.put_on_truth)
 def put_on_truth(
     start: StartMemory, position: PositionNed, velocity: VelocityNed, attitude: Attitude, then: records.TruthThen,
     *, reached: bool,
@@ -183,7 +183,7 @@ def put_on_truth(
 
 
 # -- from the horizon to now --------------------------------------------------------------------------------------
-@on_both
+@on_both(calls.find_place)
 def find_place(place: records.PadPlace, pad: PadSaid, ground: GroundMemory, below: GroundSaid) -> records.PadPlace:
     """The pad's place by its camera and by the range, where they have found it."""
     found, grounded = pad.known > 0.0, ground.known > 0.0
@@ -220,7 +220,7 @@ def over_pad(c: Carried, place: records.PadPlace) -> records.Estimated:
     )
 
 
-@on_both
+@on_both(calls.note_knowledge)
 def note_knowledge(
     before: Knowledge, around: Around, pad: PadSaid, variance: PadVariance, ground: GroundMemory,
     suspicion: SuspicionMemory,
@@ -237,7 +237,7 @@ def note_knowledge(
     )
 
 
-@PLANT.on_lanes
+@PLANT.on_lanes(calls.keep_inertial)
 def keep_inertial(reading: Reading) -> records.InertialThen:
     """Remember the reading that was just put into a slot."""
     return records.InertialThen(
@@ -254,7 +254,7 @@ class HandedOver(NamedTuple):
     error: records.AttitudeError
 
 
-@on_both
+@on_both(calls.hand_to_autopilot)
 def hand_to_autopilot(
     state: HelicopterState, start: StartMemory, loads: records.Loads, place: records.PadPlace, said: records.Estimated,
     *, waiting: bool, at_start: bool, reference: Reference,

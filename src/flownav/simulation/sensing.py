@@ -23,7 +23,7 @@ from flownav.sensors.range_sensor import (
     start_rangefinder,
     step_rangefinder,
 )
-from flownav.simulation import layout
+from flownav.simulation import calls, layout
 from flownav.simulation.block import draw
 from flownav.simulation.records import Arrived, Before, FlowNormals, Loads, Measured
 from flownav.vehicle.parameters import VehicleParameters
@@ -103,7 +103,7 @@ class Integrated(NamedTuple):
     now: Before
 
 
-@layout.PLANT.on_lanes
+@layout.PLANT.on_lanes(calls.true_imu)
 def true_imu(state: HelicopterState, before: Before, vehicle: VehicleParameters, *, period_s: float) -> Integrated:
     """Means over the last period in body axes, as an integrating IMU has them.
 
@@ -124,13 +124,13 @@ def true_imu(state: HelicopterState, before: Before, vehicle: VehicleParameters,
     return Integrated(ImuReading(per_s * turn[1], per_s * turn[2], per_s * turn[3], force_x, force_y, force_z), now)
 
 
-@layout.PLANT.on_lanes
+@layout.PLANT.on_lanes(calls.motion_now)
 def motion_now(state: HelicopterState) -> Before:
     """Velocity NED and attitude, whence an inertial period begins."""
     return motion_of(state)
 
 
-@layout.PLANT.on_lanes
+@layout.PLANT.on_lanes(calls.rest_rangefinder)
 def rest_rangefinder(
     state: HelicopterState, *, lens_below_cg_m: float, sonar: RangefinderParameters
 ) -> RangefinderState:
@@ -139,7 +139,7 @@ def rest_rangefinder(
     return start_rangefinder(lens_height(state, cosine, lens_below_cg_m), cosine, sonar)
 
 
-@layout.PAPERS.on_lanes
+@layout.PAPERS.on_lanes(calls.rest_flow)
 def rest_flow(state: HelicopterState, loads: Loads, vehicle: VehicleParameters, flow: FlowParameters) -> FlowState:
     """The flow sensor settled on the first state."""
     return start_flow(state.u, state.v, state.w, loads.thrust_n / vehicle.mass_kg, flow)
@@ -177,7 +177,7 @@ class Ranged(NamedTuple):
     reading: RangeReading
 
 
-@layout.PLANT.on_lanes
+@layout.PLANT.on_lanes(calls.read_rangefinder)
 def read_rangefinder(
     state: HelicopterState, before: RangefinderState, normals: FlowNormals, *, lens_below_cg_m: float,
     sonar: RangefinderParameters,
@@ -196,7 +196,7 @@ class Flowed(NamedTuple):
     reading: FlowReading
 
 
-@layout.PAPERS.on_lanes
+@layout.PAPERS.on_lanes(calls.read_flow_sensor)
 def read_flow_sensor(
     state: HelicopterState, before: FlowState, sonar: RangefinderState, n: FlowNormals, sensor: FlowParameters, *,
     lens_below_cg_m: float, pad_half_size_m: float,
@@ -220,7 +220,7 @@ class Heard(NamedTuple):
     arrived: Arrived
 
 
-@layout.PLANT.on_lanes
+@layout.PLANT.on_lanes(calls.choose_measurement)
 def choose_measurement(gps: gps_ins.NavSolution, flow: FlowReading, *, gps_offers_velocity: bool) -> Heard:
     """The GPS/INS's position, and velocity by flow where it is engaged, else the GPS/INS's own, turned to the body."""
     rotation = rotation_from_quaternion(gps.qw, gps.qx, gps.qy, gps.qz)
@@ -246,5 +246,5 @@ def sense(work: Work, lanes: Lanes, epoch: int, suite: SensorSuite) -> None:
     read_gps(work, lanes, suite)
     if epoch % RANGE_EPOCHS == 0:
         read_rangefinder(work, lanes, suite.lens_below_cg_m, suite.rangefinder)
-    read_flow_sensor(work, lanes, suite.lens_below_cg_m, suite.pad_half_size_m)
+    read_flow_sensor(work, lanes, suite.lens_below_cg_m, pad_half_size_m=suite.pad_half_size_m)
     choose_measurement(work, lanes, suite.gps_offers_velocity)

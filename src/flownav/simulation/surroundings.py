@@ -7,7 +7,7 @@ import numpy as np
 from flownav.core.compile import Lanes, Work, equation, procedure, replacing
 from flownav.core.frames import Rotation, rotation_from_quaternion, to_earth
 from flownav.sensors.geometry import Ground, ground_height, roughness, stepped
-from flownav.simulation import layout
+from flownav.simulation import calls, layout
 from flownav.simulation.block import RECIRCULATION_CHANNEL, draw
 from flownav.simulation.ground import (
     RecirculationParameters,
@@ -59,7 +59,7 @@ def start_surroundings(work: Work, lanes: Lanes, rotors: tuple[int, ...] | None)
     lay_ground(work, lanes, rotors)
 
 
-@layout.PLANT.on_lanes
+@layout.PLANT.on_lanes(calls.first_gusts)
 def first_gusts(normals: WindNormals, wind: WindParameters) -> WindState:
     """Gusts from their stationary distribution."""
     return start_wind(normals, wind)
@@ -91,7 +91,7 @@ class Air(NamedTuple):
     around: Around
 
 
-@layout.PLANT.on_lanes
+@layout.PLANT.on_lanes(calls.blow)
 def blow(
     state: HelicopterState, ground: Ground, gusts: WindState, normals: WindNormals, wind: WindParameters, here: Around,
     *, now: Runs,
@@ -103,7 +103,7 @@ def blow(
     return Air(after, in_air(around, air))
 
 
-@layout.PLANT.on_lanes
+@layout.PLANT.on_lanes(calls.come_back)
 def come_back(
     state: HelicopterState, wake: RecirculationState, p: RecirculationParameters, here: Around, loads: Loads
 ) -> Around:
@@ -145,7 +145,7 @@ def draw_recirculation(work: Work, lanes: Lanes, seed: int, first: int, step: in
         draw(work, lanes, layout.RECIRCULATION_NORMALS, 4, seed, first, step, RECIRCULATION_CHANNEL)
 
 
-@layout.PLANT.on_lanes
+@layout.PLANT.on_lanes(calls.lay_ground)
 def lay_ground(
     state: HelicopterState, ground: Ground, here: Around, vehicle: VehicleParameters, x: MultirotorParameters, *,
     rotors: tuple[int, ...] | None,

@@ -11,6 +11,7 @@ import numpy as np
 
 from flownav.core.compiling.cache import STORE, file_name
 from flownav.core.compiling.declared import begin_compiling, when_compiling
+from flownav.core.compiling.level import Leanness
 from flownav.core.compiling.loaded import python_function
 from flownav.core.compiling.words import words_of
 
@@ -38,9 +39,15 @@ def stands_for(law: Callable[..., Any], function: Function) -> Function:
 
 
 def spelled(function: Function, how: str, *told: Any) -> Function:
-    """A function that kernels get as instructions, which `how` of the module `spelled` writes, called with `told`."""
-    EQUATIONS[function] = True  # another target's compiler compiles the Python function
-    _tell("spelled", how, function, *told)
+    """A function that kernels get as instructions, which `how` of the module `spelled` writes, called with `told`.
+
+    With `FLOWNAV_PLAIN=1` it is an equation as any other, as it is for another target's compiler.
+    """
+    EQUATIONS[function] = True
+    if Leanness.wanted:
+        _tell("spelled", how, function, *told)
+    else:
+        _tell("compiler", "inlined", function)
     return function
 
 

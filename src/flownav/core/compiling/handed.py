@@ -12,6 +12,8 @@ from numba import types
 from numba.core.datamodel.models import TupleModel, UniTupleModel
 from numba.core.datamodel.registry import default_manager
 
+from flownav.core.compiling.level import Leanness
+
 OURS = "flownav."
 
 
@@ -45,6 +47,8 @@ def _record_model(models: Any, kind: Any) -> Any:
 
 
 def hand_over_whole() -> None:
-    """From now on, in this process."""
+    """From now on, in this process; not with `FLOWNAV_PLAIN=1`."""
+    if not Leanness.wanted:
+        return
     for kind in (types.NamedTuple, types.NamedUniTuple):
         default_manager.register(kind, _record_model)

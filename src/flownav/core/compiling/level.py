@@ -39,7 +39,10 @@ MARKS = {
 
 
 class Leanness:
-    """Whether functions are compiled as `target.LeanLibrary` does, or as Numba does by itself (`FLOWNAV_PLAIN=1`)."""
+    """Whether functions are compiled as `target.LeanLibrary` does, or as Numba does by itself (`FLOWNAV_PLAIN=1`).
+
+    Without it nothing of Numba's inside is replaced either: not `remembered.PATCHES`, `handed` or `spelled`.
+    """
 
     wanted = not os.environ.get("FLOWNAV_PLAIN")
 

@@ -5,6 +5,10 @@ written without rows, lanes or loops: it takes the records that its parameters a
 that it changes. From the annotations the loop is generated that loads each lane's records, calls the function, and
 stores what it returns; straight-line code, which LLVM vectorises. A result of a function beyond its memory (an offer to
 the filter, an event, a state to reset) is a record that some procedure takes: its sink.
+
+The loop is called with other arguments than the function has. They stand, one line for each function, in a module
+`calls` beside the functions, which tools/calls.py writes and tests/compiling/test_calls.py holds; the decorator takes
+that line, so that mypy checks every call.
 """
 
 from __future__ import annotations
@@ -12,7 +16,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Sequence
 from types import FunctionType
-from typing import Any, NamedTuple, Protocol, cast, get_args, get_origin, get_type_hints
+from typing import Any, NamedTuple, ParamSpec, Protocol, TypeVar, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +24,16 @@ from numpy.typing import NDArray
 from flownav.core.compiling.bundles import lane_access, write_function
 from flownav.core.compiling.engine import equation, procedure
 
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result", covariant=True)
 
-class OnLanes(Protocol):
+
+class OnLanes(Protocol[Arguments, Result]):
     """`run(work, lanes, **told)`, and the function of one lane's records itself."""
 
     law: Callable[..., Any]
 
-    def __call__(self, work: Any, lanes: Any, *told: Any, **named: Any) -> Any:
+    def __call__(self, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
         """Call the law in every lane; True where a truth that it returns (a `bool` field) holds in any."""
 
 
@@ -126,7 +133,14 @@ class Layout:
         for first, values in self._fresh:
             work[first : first + len(values)] = np.array(values)[:, None]
 
-    def on_lanes(self, function: Callable[..., Any]) -> OnLanes:
+    def on_lanes(self, call: Callable[Arguments, Result]) -> Callable[[Callable[..., Any]], OnLanes[Arguments, Result]]:
+        """A decorator: a function of one lane's records becomes a procedure on all lanes, called as `call` is.
+
+        call: a line of a module `calls`; only its arguments count, and only for whoever checks types.
+        """
+        return cast(Callable[[Callable[..., Any]], OnLanes[Arguments, Result]], self.loop)
+
+    def loop(self, function: Callable[..., Any]) -> OnLanes[..., Any]:
         """A function of one lane's records made a procedure on all lanes.
 
         Its positional parameters are annotated with records of this layout, or with named tuples of them; its
@@ -226,7 +240,7 @@ def _is_of_records(kind: Any) -> bool:
     return hasattr(kind, "_fields") and not {float, int} & set(get_type_hints(kind).values())
 
 
-def _generated(layout: Layout, function: Callable[..., Any]) -> OnLanes:
+def _generated(layout: Layout, function: Callable[..., Any]) -> OnLanes[..., Any]:
     if function.__kwdefaults__:
         raise TypeError(f"{function.__name__}: what the caller tells has no defaults")
     plan, result = _Plan(layout, function), get_type_hints(function)["return"]
@@ -236,7 +250,7 @@ def _generated(layout: Layout, function: Callable[..., Any]) -> OnLanes:
     source += [f"    {truth} = False" for truth in plan.truths]
     source += ["    for lane in range(len(lanes)):", *(f"        {line}" for line in lines)]
     source += [f"    return {' or '.join(plan.truths)}"] if plan.truths else []
-    return cast(OnLanes, dressed(write_function("run", "\n".join(source) + "\n", plan.scope), function))
+    return cast(OnLanes[..., Any], dressed(write_function("run", "\n".join(source) + "\n", plan.scope), function))
 
 
 def parameters(function: Callable[..., Any]) -> list[inspect.Parameter]:

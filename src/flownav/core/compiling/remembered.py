@@ -1,6 +1,7 @@
 """Work that Numba does again at every line, done once: typing of operators, looks into signatures and instructions.
 
-All of this is only in force inside `remembering()`, and changes no result.
+All of this is only in force inside `remembering()`, and changes no result. A part that this version of Numba does not
+have stays as Numba has it, and with `FLOWNAV_PLAIN=1` all do (docs/explanation/numba.md).
 """
 
 import operator
@@ -14,6 +15,8 @@ from numba.core import base, errors, event, ir, postproc, ssa, targetconfig, tra
 from numba.core.datamodel.models import TupleModel
 from numba.core.runtime.context import NRTContext
 
+from flownav.core.compiling.level import Leanness
+
 OPERATORS = frozenset(function for function in vars(operator).values() if callable(function))
 _typed: dict[tuple[Any, ...], Any] = {}
 _hashes: dict[int, tuple[int, Any]] = {}  # by id, each with its type, which is kept alive by that
@@ -23,8 +26,9 @@ _hashes: dict[int, tuple[int, Any]] = {}  # by id, each with its type, which is 
 def remembering() -> Iterator[None]:
     """Remember inside the block, where this version of Numba has these parts."""
     with ExitStack() as stack:
-        for owner, name, replacement in PATCHES:
-            stack.enter_context(_replaced(owner, name, replacement))
+        for owner, name, replacement in PATCHES if Leanness.wanted else ():
+            if hasattr(owner, name):
+                stack.enter_context(_replaced(owner, name, replacement))
         yield
 
 
@@ -157,14 +161,19 @@ def _received(self: Any, builder: Any, value: Any) -> Any:
     return value if self.get_value_type() == self.get_data_type() else _original_received(self, builder, value)
 
 
-_original_type_of_call = types.Function.get_call_type
-_original_counted_parts = NRTContext.get_meminfos
-_original_prepared = postproc.PostProcessor.run
-_original_returned, _original_received = TupleModel.as_return, TupleModel.from_return
+def _own(owner: Any, name: str) -> Any:
+    """A part of Numba; None where this version has none of the name, and `remembering` leaves it alone."""
+    return getattr(owner, name, None)
+
+
+_original_type_of_call = _own(types.Function, "get_call_type")
+_original_counted_parts = _own(NRTContext, "get_meminfos")
+_original_prepared = _own(postproc.PostProcessor, "run")
+_original_returned, _original_received = _own(TupleModel, "as_return"), _own(TupleModel, "from_return")
 PLAIN = frozenset({str, int, float, bool, type(None), ir.Loc, ir.Scope})
 PATCHES: tuple[tuple[Any, str, Any], ...] = (
     (types.Function, "get_call_type", _type_of_call),
-    (base, "_has_loc", cache(base._has_loc)),
+    (base, "_has_loc", cache(_own(base, "_has_loc") or bool)),
     (ir.Inst, "_rec_list_vars", _variables),
     (ssa, "_run_ssa_block_pass", _renamed),
     (types.Type, "__hash__", _hash_of_type),

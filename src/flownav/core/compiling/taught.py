@@ -11,13 +11,17 @@ from numba.core.typing.typeof import typeof_impl
 from numba.extending import intrinsic, lower_builtin, overload
 
 from flownav.core.compiling.engine import Kernel
-from flownav.core.compiling.handed import hand_over_whole
 from flownav.core.compiling.pointers import invoke, pointer
 from flownav.core.compiling.scalars import bits_from_float, float_from_bits
 
 PASSED = (types.CPointer, types.Integer, types.Float, types.Boolean)
 
-hand_over_whole()
+try:
+    from flownav.core.compiling.handed import hand_over_whole
+except (ImportError, AttributeError):
+    pass  # a Numba with other models of tuples: it takes each apart, which costs time only
+else:
+    hand_over_whole()
 
 
 @typeof_impl.register(Kernel)

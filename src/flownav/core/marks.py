@@ -1,9 +1,9 @@
 """By what a file is known as flownav's, so that it may be replaced: a mark at a fixed place that nobody else writes.
 
 A text begins with a line that has the SHA-256 of all that follows, so that one which was edited is no longer ours: who
-edits a file has made it. JSON has no comments: there the digest is a key, and in a page's head an element. EuRoC's tables begin with their columns'
-names: there it is one name more. Of other formats the mark is what their header says of who wrote them. Notes that
-speak of flownav, and what another tool made, are not ours, whatever they say.
+edits a file has made it. JSON has no comments: there the digest is a key, and in a page's head an element. EuRoC's
+tables begin with their columns' names: there it is one name more. Of other formats the mark is what their header says
+of who wrote them. Notes that speak of flownav, and what another tool made, are not ours, whatever they say.
 """
 
 import hashlib

@@ -129,9 +129,7 @@ class Sources:
 def _recalled(memory: Path) -> dict[str, Source]:
     """What an earlier process has written, nothing where that is missing or damaged."""
     try:
-        if distrusted_folder(memory.parent, sticky=True) or distrusted(
-            memory.stat()
-        ):  # before it is opened: it may be a FIFO
+        if distrusted_folder(memory.parent, sticky=True) or distrusted(memory.stat()):  # who opens a FIFO waits
             return {}
         with memory.open("rb") as file:
             if distrusted(os.fstat(file.fileno())):  # another file may have taken its name meanwhile

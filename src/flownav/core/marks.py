@@ -12,8 +12,9 @@ import mmap
 import re
 import zipfile
 import zlib
+from io import BufferedReader
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 LINE = "written by flownav; SHA-256 of what follows: "
 HASH, XML = ("# ", ""), ("<!-- ", " -->")  # how a comment begins and ends
@@ -125,7 +126,7 @@ def _is_our_json(text: bytes) -> bool:
     return isinstance(said, dict) and said.pop(KEY, None) == _digest(said)
 
 
-def _is_our_page(head: bytes, rest: IO[bytes]) -> bool:
+def _is_our_page(head: bytes, rest: BufferedReader) -> bool:
     """By the first bytes of a file, and the file, of which they have been read."""
     lower = head.lower()
     if b"<html" not in lower:

@@ -3,6 +3,8 @@
 import gc
 import os
 import signal
+import sys
+import warnings
 from typing import Any
 
 COLLECT_AFTER = 50_000  # objects; Python's own 700 costs an eighth of a warm flight, to find next to nothing
@@ -14,6 +16,9 @@ def main() -> None:
     before = signal.getsignal(signal.SIGINT)
     if before is signal.default_int_handler:  # not where whoever started us has it ignored
         signal.signal(signal.SIGINT, _leave)
+    if not sys.warnoptions:  # Python's own lines about our source help no user; -W shows them
+        warnings.simplefilter("ignore")
+        sys.warnoptions.append("ignore")  # which Python gives to the processes that it starts
     gc.set_threshold(COLLECT_AFTER)
     from flownav.cli import asked, run
 

@@ -198,3 +198,37 @@ def test_a_misspelt_name_is_asked_back(call, said):
     with pytest.raises(flownav.InputError) as far:
         flownav.fly(zzz=3)
     assert "did you mean" not in str(far.value)
+
+
+@pytest.mark.parametrize("wrong", [3, "x", None, [1.0], object()])
+def test_an_object_is_made_of_what_it_holds(wrong):
+    for call in (flownav.Scenario, flownav.Sensor, flownav.Vehicle, flownav.Record):
+        if wrong is not None or call is not flownav.Record:
+            assert " is given; a" in said(call, wrong)
+            assert " is needed" in said(call, wrong)
+    assert said(flownav.Record, {"kind": "fly"}, {"estimate": wrong}).endswith("is given; a mapping by names is needed")
+    if not isinstance(wrong, str):
+        assert said(flownav.Table, wrong).endswith("is given; a mapping by names is needed")
+
+
+@pytest.mark.parametrize(
+    ("t_s", "told"),
+    [
+        ([0.0, np.nan], "row 2 has the time nan s, which no clock shows"),
+        ([0.0, 1e12], "row 2 has the time 1e+12 s, which no clock shows"),
+        ([0.0, 1e6], "more than two days"),
+        ([1.0, 0.0], "row 2 is earlier than the row before it"),
+        ([0.0, "x"], "could not convert"),
+    ],
+)
+def test_times_that_no_flight_has_are_in_no_file(t_s, told, tmp_path):
+    """A grid that is laid over them would fill the memory."""
+    zeros = dict.fromkeys(("pos_n_m", "pos_e_m", "pos_d_m"), np.zeros(2))
+    record = flownav.Record({"kind": "replay", "log": "x"}, {"estimate": {"t_s": np.array(t_s), **zeros}})
+    assert told in said(record.save, tmp_path / "x.fnr")
+    assert told in said(record.report, tmp_path / "x.html")
+    for to in ("mcap", "tum", "csv", "kml"):
+        assert told in said(record.export, to, tmp_path / "x")
+    without = flownav.Record({"kind": "replay"}, {"estimate": zeros})
+    assert "no t_s" in said(without.save, tmp_path / "x.fnr")
+    assert list(tmp_path.iterdir()) == []

@@ -79,3 +79,11 @@ def test_the_same_error_for_python_and_for_the_command_line(tmp_path):
     done = run("replay", log, "--outage-table", "0:900:0.01", cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr.startswith("flownav: --outage-table 0:900:0.01: that is 90000 windows; ")
+
+
+@pytest.mark.parametrize("name", ["a\nb", "a\rb", "a\x1b[2Jb", "a\x00b", "a\x9bb", "a\u2028b", "a\tb"])
+def test_a_name_in_a_message_neither_begins_a_line_nor_moves_the_cursor(name):
+    text = str(InputError(f"{name}: no such file"))
+    assert text.isprintable()
+    assert text == f"{repr(name)[1:-1]}: no such file"
+    assert str(InputError(f"{arg('gps')} für {name}")).startswith("gps für a\\")

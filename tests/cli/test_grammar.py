@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import subprocess
@@ -211,6 +212,32 @@ def test_info_fits_80_columns(tmp_path, name):
     assert "…" not in done.stdout
     assert any(re.search(r"sensor +readings +rate \[Hz\] +from \[s\] +to \[s\] +gap \[s\] +no data \[%\]", line)
                for line in lines)  # fmt: skip
+
+
+WARNED = """
+import warnings
+import flownav.cli
+from multiprocessing.util import _args_from_interpreter_flags
+from flownav.__main__ import main
+
+def run(app):
+    warnings.warn("overflow encountered in exp", RuntimeWarning)
+    warnings.warn("something else")
+    print("-Wignore" in _args_from_interpreter_flags())
+
+flownav.cli.asked, flownav.cli.run = lambda: None, run
+main()
+"""
+
+
+def test_pythons_warnings_reach_nobody_who_did_not_ask_for_them():
+    """Nor those of the processes that a command starts; -W shows them."""
+    clean = {name: value for name, value in os.environ.items() if name != "PYTHONWARNINGS"}
+    done = subprocess.run([sys.executable, "-c", WARNED], capture_output=True, text=True, env=clean)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "True\n", "")
+    done = subprocess.run([sys.executable, "-W", "default", "-c", WARNED], capture_output=True, text=True, env=clean)
+    assert done.stdout == "False\n"
+    assert "RuntimeWarning: overflow encountered in exp" in done.stderr
 
 
 INTERRUPTED = """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -234,6 +235,73 @@ def test_what_is_kept_nobody_else_may_write_to_whatever_the_umask(tmp_path):
     assert store.own.stat().st_mode & 0o777 == 0o700
     assert (store.own / "x.kernel").stat().st_mode & 0o777 == 0o600
     assert store.load("x.kernel") == b"code"
+
+
+def kept(folder: Path) -> cache.Store:
+    """A store of one kernel in a folder of its own."""
+    store = cache.Store(folder, folder / "none")
+    store.save("x.kernel", b"code")
+    return store
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="modes are of Unix")
+@pytest.mark.parametrize("mode", [0o777, 0o775, 0o757])
+def test_nor_is_what_lies_where_others_may_rename_it(tmp_path, capsys, mode):
+    kept(tmp_path / "cache").own.parent.chmod(mode)
+    store = cache.Store(tmp_path / "cache", tmp_path / "none")
+    assert store.load("x.kernel") is None
+    assert not store.is_writable()
+    store.save("y.kernel", b"code")
+    assert capsys.readouterr().err.count("others may write to it") == 1
+    assert [path.name for path in store.own.iterdir()] == ["x.kernel"]
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="/tmp is root's")
+def test_where_each_may_rename_only_what_is_its_own_a_cache_may_lie(tmp_path, capsys):
+    kept(tmp_path / "cache").own.parent.chmod(0o1777)
+    assert cache.Store(tmp_path / "cache", tmp_path / "none").load("x.kernel") == b"code"
+    (tmp_path / "cache" / "kernels").chmod(0o1777)
+    assert cache.Store(tmp_path / "cache", tmp_path / "none").load("x.kernel") is None
+    assert capsys.readouterr().err.count("others may write to it") == 1
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can give links away")
+@pytest.mark.parametrize("linked", ["cache", "cache/kernels"])
+def test_another_users_link_leads_nowhere(tmp_path, capsys, linked):
+    """Root that keeps a user's home: its kernels, and what it removes, would go wherever the user's link leads."""
+    whole = kept(tmp_path / "whole").own
+    link = tmp_path / linked
+    link.parent.mkdir(exist_ok=True)
+    link.symlink_to(whole if linked.endswith("kernels") else whole.parent)
+    assert cache.Store(tmp_path / "cache", tmp_path / "none").load("x.kernel") == b"code"
+    os.chown(link, 12345, 12345, follow_symlinks=False)
+    store = cache.Store(tmp_path / "cache", tmp_path / "none")
+    assert store.load("x.kernel") is None
+    store.save("y.kernel", b"code")
+    assert capsys.readouterr().err.count("it is a link of another user") == 1
+    assert [path.name for path in whole.iterdir()] == ["x.kernel"]
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can give folders away")
+def test_in_another_users_home_root_makes_nothing(tmp_path, capsys):
+    (tmp_path / "cache").mkdir()
+    os.chown(tmp_path / "cache", 12345, 12345)
+    store = cache.Store(tmp_path / "cache", tmp_path / "none")
+    store.save("x.kernel", b"code")
+    store.sources.closure(["flownav.core.text"])
+    assert list((tmp_path / "cache").iterdir()) == []
+    assert "belongs to another user" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="modes are of Unix")
+def test_a_memory_of_sources_where_others_may_write_is_not_read_nor_written(tmp_path):
+    sources = closure.Sources(tmp_path / "cache" / "sources.json")
+    true = sources.closure(["flownav.core.text"])
+    false = json.dumps({key: ["0" * 32, []] for key in json.loads((tmp_path / "cache" / "sources.json").read_text())})
+    (tmp_path / "cache" / "sources.json").write_text(false)
+    (tmp_path / "cache").chmod(0o777)
+    assert closure.Sources(tmp_path / "cache" / "sources.json").closure(["flownav.core.text"]) == true
+    assert (tmp_path / "cache" / "sources.json").read_text() == false
 
 
 def test_kernels_that_a_wheel_carries_are_looked_at_first(filled, monkeypatch, capsys):

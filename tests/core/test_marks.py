@@ -40,6 +40,10 @@ NOTES = {
     "page.html": "<html><head><title>x</title></head><body><meta name=\"generator\" content=\"flownav\"></body></html>",
     "quoted.html": "<html><head><title>the mark <meta name=\"generator\" content=\"flownav\"></title></head></html>",
     "comment.html": '<!-- <head><meta name="generator" content="flownav"> --><html><head></head></html>',
+    "plain.html": '<html><head><meta name="generator" content="flownav"><title>my flownav site</title></head></html>',
+    "false.html": '<html><head><meta name="generator" content="flownav"><meta name="flownav-sha256" content="'
+    + 64 * "0" + '"></head></html>',
+    "short.html": '<html><head><meta name="generator" content="flownav"><meta name="flownav-sha256" content="',
     "early.html": '<html><meta name="generator" content="flownav"><head><title>x</title></head></html>',
     "plain.txt": "flownav flew well today\n",
 }  # fmt: skip
@@ -115,6 +119,24 @@ def test_what_was_edited_by_hand_is_its_editors(exported, tmp_path, suffix):
         assert not is_ours(edited)
         edited.write_bytes(path.read_bytes() + b"\n")
         assert is_ours(edited) == (suffix == ".json")
+
+
+@pytest.mark.parametrize("text", ["x", "é \udcff", "y" * 10_000, '<meta name="generator" content="flownav">'])
+def test_a_page_that_was_edited_by_hand_is_its_editors(tmp_path, text):
+    path = tmp_path / "x.html"
+    page = f"<!doctype html><html><head><title>{text}</title></head><body>{text}</body></html>"
+    for _ in range(2):  # again over itself
+        write_page(page, path)
+        assert is_ours(path)
+    written = path.read_bytes()
+    for old, new in ((b"</body>", b"<p>my notes</p></body>"), (b"<title>", b"<title>my "), (b"doctype", b"DOCTYPE")):
+        path.write_bytes(written.replace(old, new, 1))
+        assert not is_ours(path)
+        with pytest.raises(InputError, match="was not written by flownav"):
+            place(path, force=True)
+    assert written.replace(written[written.index(b"<meta") : written.index(b"<title>")], b"", 1) == page.encode(
+        errors="backslashreplace"
+    )
 
 
 def test_a_mark_is_at_a_fixed_place_and_holds_the_rest(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from flownav.core.measurement import Sensor, Stream
 from flownav.core.record import POSITION_NED
 from flownav.logs.open_log import open_log
-from flownav.logs.references import examined, upside_down
+from flownav.logs.references import examined, of_one_origin, upside_down
 from replay_logs import log_of_flight
 
 T_S = np.arange(0.0, 40.0, 0.1)
@@ -171,3 +171,30 @@ def test_a_barometer_that_saw_the_climb_decides_before_a_range_over_a_slope():
     streams = {sensor: Stream.of(sensor, t_s, value[:, None]) for sensor, value in heights.items()}
     assert upside_down(truth, streams) == ""
     assert upside_down(truth, {Sensor.RANGE: streams[Sensor.RANGE]}) == "range"
+
+
+@pytest.mark.parametrize("known_hz", [1.0, 5.0, 50.0])
+@pytest.mark.parametrize("by_m", [8.0, 120.0])
+def test_a_reset_of_the_estimate_is_no_move_of_its_origin_however_seldom_the_other_one_comes(known_hz, by_m):
+    """Local rows at 50 Hz: between two global ones a reset looks as if the two had parted."""
+    t_s, known_t_s = np.arange(0.0, 40.0, 0.02), np.arange(0.0, 40.0, 1.0 / known_hz)
+    path = [np.column_stack([0.5 * at, 3.0 * np.sin(0.3 * at), np.full(len(at), -2.0)]) for at in (t_s, known_t_s)]
+    leap = np.array([0.6 * by_m, -0.8 * by_m, 0.0])
+    reset = [one + leap * (at >= 20.51)[:, None] for one, at in zip(path, (t_s, known_t_s), strict=True)]
+    same, found = of_one_origin(t_s, reset[0], known_t_s, reset[1])
+    assert not found
+    assert np.array_equal(same, reset[0])
+    moved, found = of_one_origin(t_s, reset[0], known_t_s, path[1])
+    assert [one.t_s for one in found] == [pytest.approx(20.52)]
+    assert found[0].by_ned_m == pytest.approx(leap, abs=0.2)
+    assert np.abs(moved - path[0]).max() < 0.2
+
+
+def test_an_origin_that_moves_twice_within_a_second_is_shifted_back_once_by_both():
+    t_s = np.arange(0.0, 20.0, 0.1)
+    path = np.column_stack([0.5 * t_s, np.zeros((len(t_s), 2))])
+    twice = path + 10.0 * (t_s >= 9.95)[:, None] + 10.0 * (t_s >= 10.25)[:, None]
+    moved, found = of_one_origin(t_s, twice, t_s, path)
+    assert len(found) == 1
+    settled = (t_s < 9.95) | (t_s >= 10.25)
+    assert np.allclose(moved[settled], path[settled])

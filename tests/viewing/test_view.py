@@ -243,6 +243,24 @@ def test_a_record_that_says_nothing_sound_of_its_vehicle_is_shown_without_one(tm
     assert "/enu/ned/truth/vehicle" not in Read(tmp_path / "a.rrd").parts
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of a file's size are of Unix")
+@pytest.mark.parametrize("missing", [1, 50, 20_000, 300_000])
+def test_a_file_that_the_disk_does_not_hold_is_not_written_and_said(tmp_path, missing, capfd):
+    """Where its last bytes cannot be written Rerun raises nothing."""
+    import resource
+
+    write_rrd(awkward(), tmp_path / "whole.rrd")
+    size = (tmp_path / "whole.rrd").stat().st_size
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size - 100 - missing, before[1]))  # the sizes of two differ by some
+    try:
+        with pytest.raises(OSError, match="is the disk full"):
+            write_rrd(awkward(), tmp_path / "x.rrd")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert [path.name for path in tmp_path.iterdir()] == ["whole.rrd"]
+
+
 def test_an_awkward_record_is_shown_with_notes(tmp_path):
     """Times out of order and before zero, rows that are not finite, truth without an attitude."""
     notes = write_rrd(awkward(), tmp_path / "a.rrd")

@@ -102,6 +102,8 @@ def _fits_any(value: Any, annotation: Any) -> bool:
 
 def _fits(value: Any, kind: Any) -> bool:
     origin, inner = get_origin(kind), get_args(kind)
+    if kind is Any:
+        return True
     if kind is None or kind is type(None):
         return value is None
     if kind is bool:
@@ -114,7 +116,7 @@ def _fits(value: Any, kind: Any) -> bool:
         return _is_list(value) and len(value) == len(inner) and all(map(_fits, value, inner))
     if origin is Sequence:
         return _is_list(value) and (get_origin(inner[0]) is tuple or all(_fits_any(one, inner[0]) for one in value))
-    if origin is Mapping:
+    if origin in (Mapping, dict):
         return isinstance(value, Mapping) and all(isinstance(key, str) for key in value)
     if origin is Callable:
         return callable(value)
@@ -148,7 +150,7 @@ def _words(kind: Any) -> str:
         return f"{len(inner)} numbers"
     if origin is Sequence:
         return "a list"
-    if origin is Mapping:
+    if origin in (Mapping, dict):
         return "a mapping by names"
     if origin is Callable:
         return "a function"

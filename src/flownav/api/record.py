@@ -6,10 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, cast
 
-from flownav.api.arguments import checked
+from flownav.api.arguments import checked, require_kind
 from flownav.api.calls import writing
 from flownav.api.table import Table
 from flownav.core import record as ground
+from flownav.core.errors import InputError
 
 
 class Record(ground.Record):
@@ -27,6 +28,12 @@ class Record(ground.Record):
         'landed'
     """
 
+    @checked
+    def __init__(self, manifest: dict[str, Any] | None = None, tables: dict[str, Any] | None = None) -> None:
+        super().__init__({} if manifest is None else manifest, {} if tables is None else tables)
+        for name, table in self.tables.items():
+            require_kind(f"table {name}", table, dict[str, Any])
+
     @classmethod
     def of(cls, record: ground.Record) -> Record:
         """This class's view of a record; one that is of it already is given back.
@@ -36,6 +43,7 @@ class Record(ground.Record):
             >>> flownav.Record.of(kept).name
             'landing'
         """
+        require_kind("record", record, ground.Record)
         tables: dict[str, Any] = {name: Table(table, name) for name, table in record.tables.items()}
         return cls(record.manifest, tables)
 
@@ -108,6 +116,7 @@ class Record(ground.Record):
 
         return scores_of_record(self)
 
+    @checked
     def rescore(self, estimate: Any, *, from_handover: bool = False, name: str = "another estimate") -> Record:
         """The record with another estimate in the place of its own, scored as ours is.
 
@@ -189,6 +198,7 @@ class Record(ground.Record):
         from flownav.report.html import write_report
 
         page = Path(f"{self.name}.html") if path is None else Path(path)
+        self._require_times()
         with writing(page):
             write_report(self, page)
         return page
@@ -205,6 +215,7 @@ class Record(ground.Record):
             '.fnr'
         """
         path = Path(path)
+        self._require_times()
         with writing(path):
             super().save(path, replacing=replacing)
         return path
@@ -224,8 +235,20 @@ class Record(ground.Record):
         from flownav.export.formats import destination, export
 
         target = destination(Path(f"{self.name}.fnr"), to, None if path is None else Path(path))
+        self._require_times()
         with writing(target):
             return [Path(file) for file in export(self, to, target, frame).files]
+
+    def _require_times(self) -> None:
+        """InputError where a table has no times, or ones that no flight can have and no reader would take."""
+        from flownav.core.record_file import check_times
+
+        try:
+            check_times(self.tables, ground.IN_ORDER, ground.LATEST_S, ground.LONGEST_S)
+        except KeyError as error:
+            raise InputError("a table of this record has no t_s") from error
+        except (ValueError, TypeError, AttributeError) as error:
+            raise InputError(f"this record cannot be written: {error}") from error
 
     def __repr__(self) -> str:
         from flownav.api.plots import lines_of

@@ -74,7 +74,7 @@ def _numbers(name: str, values: Any) -> Array:
         return np.zeros(0)
     try:
         return np.asarray(found, np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"estimate: column {name} holds something that is no number; numbers are needed") from None
 
 

@@ -34,6 +34,7 @@ class Scenario:
         'midg'
     """
 
+    @checked
     def __init__(self, file: File) -> None:
         self.file = file
 

@@ -38,6 +38,7 @@ class Sensor:
         1.03
     """
 
+    @checked
     def __init__(self, entries: dict[str, Any], path: Path | None = None, findings: Findings | None = None) -> None:
         self.entries, self.path, self.findings = entries, path, findings
         self.file: FlowSensor = check(entries, FlowSensor, str(path or entries.get("name", "the sensor")))

@@ -43,7 +43,10 @@ class Table(dict[str, Column]):
     """
 
     def __init__(self, columns: Any, name: str = "table") -> None:
-        super().__init__(columns)
+        try:
+            super().__init__(columns)
+        except (TypeError, ValueError):
+            raise InputError(f"columns: {type(columns).__name__} is given; a mapping by names is needed") from None
         self.name = name
 
     def __missing__(self, column: str) -> Column:

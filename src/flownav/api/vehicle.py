@@ -24,6 +24,7 @@ class Vehicle:
         1.5
     """
 
+    @checked
     def __init__(self, entries: dict[str, Any], path: Path | None = None) -> None:
         where = str(path or entries.get("name", "the vehicle"))
         self.entries, self.path = entries, path

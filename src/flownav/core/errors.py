@@ -6,6 +6,8 @@ from collections.abc import Callable
 # around an argument's name in a message; Unicode keeps them for a program's own use, so that no text of a user has them
 BEGIN, END = "\ufdd0", "\ufdd1"
 MOST_LETTERS = 2000  # of a message: chosen; the longest that says something, a list of all settings, has 1900
+# a name in a message may hold a new line, or what moves a terminal's cursor
+CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 ARGUMENT = re.compile(f"{BEGIN}(\\w+){END}")
 
 
@@ -21,7 +23,7 @@ class FlownavError(Exception):
     """
 
     def __init__(self, marked: object = "") -> None:
-        text = str(marked)
+        text = CONTROL.sub(lambda found: repr(found[0])[1:-1], str(marked))
         middle = MOST_LETTERS // 2
         self.marked = text if len(text) <= MOST_LETTERS else f"{text[:middle]} ... {text[-middle:]}"
         super().__init__(self.naming(str))

@@ -16,7 +16,7 @@ from typing import Any
 
 from flownav.core import files
 from flownav.core.errors import InputError
-from flownav.core.marks import HASH, PAGE_MARK, is_ours, is_signed, manifest_of, marked
+from flownav.core.marks import HASH, is_ours, is_signed, manifest_of, marked, marked_page
 
 KINDS = (
     (stat.S_ISFIFO, "a FIFO (a named pipe)"),
@@ -166,9 +166,8 @@ def written_whole(path: Path, *, replacing: bool = False) -> Iterator[Path]:
 
 def write_page(page: str, path: Path) -> None:
     """Write an HTML page, whole or not at all, with the mark by which it is known as flownav's. As `written_whole`."""
-    signed = page if PAGE_MARK in page else page.replace("<head>", f"<head>{PAGE_MARK}", 1)
     with written_whole(path) as temporary:
-        temporary.write_text(signed, encoding="utf-8", errors="backslashreplace", newline="\n")
+        temporary.write_bytes(marked_page(page))
 
 
 def write_text(text: str, path: Path, comment: tuple[str, str] = HASH) -> None:

@@ -2,9 +2,9 @@
 writes.
 
 A text begins with a line that has the SHA-256 of all that follows, so that one which was edited is no longer ours: who
-edits a file has made it. JSON has no comments: there the digest is a key. EuRoC's tables begin with their columns'
-names: there it is one name more. Of other formats the mark is what their header says of who wrote them. Notes that
-speak of flownav, and what another tool made, are not ours, whatever they say.
+edits a file has made it. JSON has no comments: there the digest is a key, and in a page's head an element. EuRoC's
+tables begin with their columns' names: there it is one name more. Of other formats the mark is what their header says
+of who wrote them. Notes that speak of flownav, and what another tool made, are not ours, whatever they say.
 """
 
 import hashlib
@@ -13,6 +13,7 @@ import mmap
 import re
 import zipfile
 import zlib
+from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,8 @@ TEXT = re.compile(
     + rb"([0-9a-f]{64})(?: -->)?\n"
 )
 KEY = "flownav_sha256"  # of a JSON object, over the rest of it
-PAGE_MARK = '<meta name="generator" content="flownav">'  # of pages, in their head
+PAGE_MARK = '<meta name="generator" content="flownav"><meta name="flownav-sha256" content="'  # of pages, in their head
+PAGE_MARK_ENDS, DIGEST_LETTERS = '">', 64
 LOOKED_AT_BYTES = 4096
 MOST_JSON_BYTES = 4 << 20
 MANIFEST, TABLE = "manifest.json", ".parquet"
@@ -49,6 +51,14 @@ def marked(text: str, comment: tuple[str, str] = HASH) -> bytes:
     first = DECLARATION if text.startswith(DECLARATION) else ""
     rest = text[len(first) :].encode("utf-8", errors="backslashreplace")
     return f"{first}{comment[0]}{LINE}{hashlib.sha256(rest).hexdigest()}{comment[1]}\n".encode() + rest
+
+
+def marked_page(page: str) -> bytes:
+    """A page as a file's bytes, with the mark as the first of its head: the digest is of the page without it."""
+    before, head, after = page.partition("<head>")
+    text = [part.encode("utf-8", errors="backslashreplace") for part in (before + head, after)]
+    mark = f"{PAGE_MARK}{hashlib.sha256(b''.join(text)).hexdigest()}{PAGE_MARK_ENDS}" if head else ""
+    return mark.encode().join(text)
 
 
 def marked_table(text: str) -> bytes:
@@ -79,12 +89,12 @@ def is_ours(path: Path) -> bool:
                     return ULOG_MARK.search(content) is not None
             if head.startswith(b"{"):
                 return _is_our_json(head + file.read(MOST_JSON_BYTES))
+            if not head.startswith(RECORD_MAGIC):
+                return any(header.match(head) for header in HEADERS) or _is_our_page(head, file)
     except OSError:
         return False
-    if head.startswith(RECORD_MAGIC):
-        manifest = manifest_of(path)
-        return manifest is not None and manifest.get("kind") != "live"  # no command makes a live session again
-    return any(header.match(head) for header in HEADERS) or _is_our_page(head)
+    manifest = manifest_of(path)
+    return manifest is not None and manifest.get("kind") != "live"  # no command makes a live session again
 
 
 def is_signed(path: Path, by: Path) -> bool:
@@ -119,10 +129,16 @@ def _is_our_json(text: bytes) -> bool:
     return isinstance(said, dict) and said.pop(KEY, None) == _digest(said)
 
 
-def _is_our_page(head: bytes) -> bool:
+def _is_our_page(head: bytes, rest: BufferedReader) -> bool:
+    """By the first bytes of a file, and the file, of which they have been read."""
     lower = head.lower()
     if b"<html" not in lower:
         return False
     start, end = lower.find(b"<head"), min((lower.find(mark) for mark in HEAD_ENDS if mark in lower), default=len(head))
     place = head.find(PAGE_MARK.encode(), max(start, 0), end)
-    return 0 <= start < place and b"<!--" not in head[:place]  # in a comment somebody only speaks of it
+    if not 0 <= start < place or b"<!--" in head[:place]:  # in a comment somebody only speaks of it
+        return False
+    digest = place + len(PAGE_MARK)
+    ends = digest + DIGEST_LETTERS
+    others = hashlib.sha256(head[:place] + head[ends + len(PAGE_MARK_ENDS) :])
+    return hashlib.file_digest(rest, lambda: others).hexdigest().encode() == head[digest:ends]

@@ -116,7 +116,7 @@ def load(
             for name in names:
                 tables[Path(name).stem], words = _table(bundle.read(name), left)
                 left -= words
-            _check_times(tables, in_order, latest_s, longest_s)
+            check_times(tables, in_order, latest_s, longest_s)
             return manifest, tables
     except WRONG as error:
         what = " ".join(str(error).split())[:200] or type(error).__name__
@@ -250,7 +250,7 @@ def _length(column: Any) -> int:
     return found
 
 
-def _check_times(tables: Tables, in_order: Collection[str], latest_s: float, longest_s: float) -> None:
+def check_times(tables: Tables, in_order: Collection[str], latest_s: float, longest_s: float) -> None:
     """ValueError where times are none that a flight can have: whoever lays a grid over them would fill the memory."""
     ends = []
     for name, table in tables.items():

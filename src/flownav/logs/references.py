@@ -160,20 +160,27 @@ def of_one_origin(t_s: Array, local: Array, known_t_s: Array, known: Array) -> t
     """A local path (n,), (n, 3) about its first origin, and when and by what that moved.
 
     known_t_s (m,), known (m, 3): the same estimate about an origin that does not move. Where the two part from one row
-    to the next and stay apart, it is the origin that has moved.
+    to the next and stay apart, it is the origin that has moved. The known ones about a row are left out: between them
+    it is not known when the estimate itself was reset.
     """
     path, found = local.copy(), list[Leap]()
     covered = np.flatnonzero((t_s >= known_t_s[0]) & (t_s <= known_t_s[-1])) if len(known_t_s) else np.zeros(0, int)
     if len(covered) < 2 * LEAST_ROWS:
         return path, found
     there = np.column_stack([np.interp(t_s[covered], known_t_s, column) for column in known.T])
-    apart = local[covered] - there
+    apart, at_s, done = local[covered] - there, t_s[covered], 0
     for place in np.flatnonzero(np.linalg.norm(np.diff(apart, axis=0), axis=1) >= LEAST_MOVE_M) + 1:
-        before, after = apart[max(place - LEAST_ROWS, 0) : place], apart[place : place + LEAST_ROWS]
+        last = known_t_s[np.searchsorted(known_t_s, at_s[place - 1], side="right") - 1]
+        first = known_t_s[np.searchsorted(known_t_s, at_s[place])]
+        early, late = int(np.searchsorted(at_s, last, side="right")), int(np.searchsorted(at_s, first))
+        before, after = apart[max(early - LEAST_ROWS, 0) : early], apart[late : late + LEAST_ROWS]
+        if place < done or min(len(before), len(after)) < LEAST_ROWS:
+            continue
         by = np.median(after, axis=0) - np.median(before, axis=0)
-        if min(len(before), len(after)) >= LEAST_ROWS and float(np.linalg.norm(by)) >= LEAST_MOVE_M:
-            found.append(Leap(float(t_s[covered[place]]), by))
+        if float(np.linalg.norm(by)) >= LEAST_MOVE_M:
+            found.append(Leap(float(at_s[place]), by))
             path[covered[place] :] -= by
+            done = late + LEAST_ROWS  # what moves within the rows after is in their median already
     return path, found
 
 

@@ -6,7 +6,8 @@ and the versions of the compilers. It begins with a checksum of the rest. Files 
 a wheel carries, which nobody writes, then in the user's cache (`FLOWNAV_CACHE`, `~/.cache/flownav`).
 
 A damaged file is compiled anew and replaced. A folder that cannot be written, or that somebody else owns or may write
-to (a cache holds code that is run), is not used, with one line on standard error.
+to (a cache holds code that is run), or that lies in such a folder or behind such a user's link, is not used, which one
+line on standard error states.
 """
 
 import hashlib
@@ -24,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from flownav.core.compiling.closure import OWN_FILE, OWN_FOLDER, PACKAGE, Sources, distrusted
+from flownav.core.compiling.closure import OWN_FILE, OWN_FOLDER, PACKAGE, Sources, distrusted, distrusted_folder
 from flownav.core.compiling.level import target_description
 from flownav.core.files import written_whole
 
@@ -68,8 +69,7 @@ class Store:
     def is_writable(self) -> bool:
         """Whether what is saved would be kept."""
         try:
-            self._make()
-            return self._usable and os.access(self.own, os.W_OK | os.X_OK) and not distrusted(self.own.stat())
+            return self._usable and not self._make() and os.access(self.own, os.W_OK | os.X_OK)
         except OSError:
             return False
 
@@ -78,8 +78,7 @@ class Store:
         if not self._usable:
             return
         try:
-            self._make()
-            if why := distrusted(self.own.stat()):
+            if why := self._make():
                 self._give_up(why)
                 return
             with written_whole(self.own / name) as file:
@@ -89,10 +88,17 @@ class Store:
         except OSError as error:
             self._give_up(error.strerror or str(error))
 
-    def _make(self) -> None:
-        """Make the folder, which no other user may write to whatever the umask."""
-        self.own.parent.mkdir(parents=True, exist_ok=True)
+    def _make(self) -> str:
+        """Make the folder, which no other user may write to whatever the umask; why it is not to be trusted, or ""."""
+        if why := self._distrusted():
+            return why
+        self.own.parent.mkdir(OWN_FOLDER, parents=True, exist_ok=True)
         self.own.mkdir(OWN_FOLDER, exist_ok=True)
+        return self._distrusted()
+
+    def _distrusted(self) -> str:
+        """Why somebody else could change what is kept, by the folder or the one that it lies in; "" where nobody."""
+        return distrusted_folder(self.own.parent, sticky=True) or distrusted_folder(self.own)
 
     def damaged(self, name: str, why: str) -> None:
         """Report that a file is damaged; it is compiled anew and replaced."""
@@ -100,8 +106,11 @@ class Store:
 
     def _read(self, path: Path, shipped: bool) -> bytes | None:
         try:
+            if not shipped and (why := self._distrusted()):
+                self._give_up(why)
+                return None
             with path.open("rb") as file:
-                if not shipped and (why := distrusted(os.fstat(file.fileno())) or distrusted(self.own.stat())):
+                if not shipped and (why := distrusted(os.fstat(file.fileno()))):
                     self._give_up(why)
                     return None
                 content = file.read()

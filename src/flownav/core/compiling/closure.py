@@ -9,6 +9,7 @@ import ast
 import hashlib
 import json
 import os
+import stat
 import sys
 import time
 from collections.abc import Iterable, Iterator
@@ -116,6 +117,8 @@ class Sources:
         self._learnt = False
         newest = list(self._known.items())[-REMEMBERED_FILES:]
         try:
+            if distrusted_folder(self._memory.parent, sticky=True):
+                return
             with written_whole(self._memory) as file:
                 file.touch(OWN_FILE)
                 file.write_text(json.dumps(dict(newest)), encoding="utf-8")
@@ -126,9 +129,12 @@ class Sources:
 def _recalled(memory: Path) -> dict[str, Source]:
     """Sources that an earlier process has written; empty where the file is missing or damaged."""
     try:
-        if distrusted(memory.stat()):
+        if distrusted_folder(memory.parent, sticky=True) or distrusted(memory.stat()):  # who opens a FIFO waits
             return {}
-        entries = json.loads(memory.read_bytes())
+        with memory.open("rb") as file:
+            if distrusted(os.fstat(file.fileno())):  # another file may have taken its name meanwhile
+                return {}
+            entries = json.loads(file.read())
         return {key: Source(str(digest), tuple(map(str, imports))) for key, (digest, imports) in entries.items()}
     except (OSError, ValueError, TypeError, AttributeError):
         return {}
@@ -141,6 +147,24 @@ def distrusted(status: os.stat_result) -> str:
     if status.st_uid not in (0, os.geteuid()):
         return "it belongs to another user"
     return "others may write to it: `chmod -R go-w`" if status.st_mode & OTHERS_WRITE else ""
+
+
+def distrusted_folder(folder: Path, *, sticky: bool = False) -> str:
+    """Why somebody else could lead a folder's name elsewhere, or rename what lies in it; "" where nobody could.
+
+    sticky: others may write where they may rename only their own files (/tmp). A link counts as its maker's: a
+    superuser who keeps a user's home would otherwise write wherever that user's links lead. A folder that is not there
+    yet is nobody's. OSError where it cannot be looked at.
+    """
+    try:
+        link, status = folder.lstat(), folder.stat()
+    except FileNotFoundError:
+        return ""
+    if stat.S_ISLNK(link.st_mode) and hasattr(os, "geteuid") and link.st_uid not in (0, os.geteuid()):
+        return "it is a link of another user"
+    if sticky and status.st_mode & stat.S_ISVTX and status.st_uid == 0:
+        return ""
+    return distrusted(status)
 
 
 def _changed_since_start(module: str) -> bool:

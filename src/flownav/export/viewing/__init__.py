@@ -1,5 +1,6 @@
 """A record in Rerun's viewer: the flight in space, its cameras, flow, errors and innovations on one time line."""
 
+import errno
 import os
 import sys
 import uuid
@@ -13,6 +14,7 @@ from flownav.export.trajectory import trajectories
 
 APPLICATION = "flownav"
 SUFFIX = ".rrd"
+HEADER, FOOTER, TAIL_BYTES = b"RRF2", b"RRF2FOOT", 12  # a file of that format begins and ends so
 NEEDED = "flownav view needs Rerun's package rerun-sdk: pip install 'flownav[view]'"
 
 
@@ -38,10 +40,24 @@ def write_rrd(record: Record, path: Path) -> list[str]:
     """
     _require_rerun()
     with written_whole(path) as temporary:
-        prepared = _prepare(record, path.stem, to=temporary)
-        prepared.stream.flush()
-        prepared.stream.disconnect()
+        try:
+            prepared = _prepare(record, path.stem, to=temporary)
+            prepared.stream.flush()
+            prepared.stream.disconnect()
+        except RuntimeError as error:  # Rerun's, for whatever the system says
+            raise OSError(errno.EIO, f"Rerun: {str(error).splitlines()[0]}; is the disk full?", str(path)) from error
+        if not _is_whole(temporary):
+            raise OSError(errno.ENOSPC, "Rerun could not write all of it; is the disk full?", str(path))
     return prepared.notes
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether a file ends as Rerun ends one: where its last bytes cannot be written, it only logs that."""
+    with path.open("rb") as file:
+        if file.read(len(HEADER)) != HEADER:  # of a later Rerun, whose end is not known
+            return True
+        file.seek(max(os.fstat(file.fileno()).st_size - TAIL_BYTES, 0))
+        return FOOTER in file.read(TAIL_BYTES)
 
 
 def show(record: Record, name: str) -> list[str]:
@@ -62,6 +78,7 @@ def show(record: Record, name: str) -> list[str]:
 
 
 def _require_rerun() -> None:
+    os.environ.setdefault("RUST_LOG", "off")  # else its own lines stand beside ours
     try:
         import rerun  # noqa: F401
     except ImportError as error:

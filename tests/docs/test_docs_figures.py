@@ -209,6 +209,13 @@ def test_without_git_and_of_an_unknown_commit_nothing_is_marked(clone, tmp_path_
     assert figures_history.head(bare) is None
 
 
+def test_commits_that_a_clone_does_not_have_are_named(clone, tmp_path_factory):
+    folder, commit = clone
+    runs = [Run("a", commit("a.py", "x = 1\n"), "", None, ()), Run("b", "f" * 8, "", None, ())]
+    assert figures_history.unknown(runs, folder) == ["f" * 8]
+    assert figures_history.unknown(runs, tmp_path_factory.mktemp("sdist")) == []
+
+
 def test_what_is_not_committed_is_named(clone):
     folder, commit = clone
     commit("code.py", "x = 1\n"), commit("other.py", "y = 1\n")
@@ -262,6 +269,69 @@ def test_a_figure_that_is_not_printed_leaves_the_book_as_it_was():
     with pytest.raises(LookupError, match="no case is approach"):
         figures.measure("acc", PRODUCER, book, "abc", lambda line: json.dumps({"cases": PRINTED["cases"][:1]}))
     assert book == Book()
+
+
+@pytest.fixture
+def bench(tmp_path, monkeypatch):
+    """`figures.main` with two producers of its own, whose command prints {"x": 0.5} or fails, and a README."""
+    made = {name: figures_table.Producer(name, ("src",), {"x_m": figures_table.Read("x", "m", 1)}) for name in "ab"}
+    monkeypatch.setattr(figures, "PRODUCERS", made)
+    monkeypatch.setattr(figures, "README", tmp_path / "README.md")
+    monkeypatch.setattr(figures_history, "head", lambda: "abc12345")
+    monkeypatch.setattr(figures_history, "uncommitted", lambda paths: [])
+    book = tmp_path / "figures.json"
+    monkeypatch.setattr(figures_book, "read", lambda read=figures_book.read: read(book))
+    monkeypatch.setattr(figures_book, "write", lambda each, write=figures_book.write: write(each, book))
+    monkeypatch.setattr(figures, "run", lambda line: json.dumps({"x": 0.5} if line == "b --json" else {}))
+    (tmp_path / "README.md").write_text("<!-- figure b.x_m -->9 m<!-- end -->")
+    return tmp_path
+
+
+def test_what_has_run_is_kept_where_another_fails(bench, capsys):
+    assert figures.main(["a", "b"]) == 1
+    noted = json.loads((bench / "figures.json").read_text())
+    assert list(noted["figures"]) == ["b.x_m"]
+    assert noted["runs"]["b"]["commit"] == "abc12345"
+    assert (bench / "README.md").read_text() == "<!-- figure b.x_m -->0.5 m<!-- end -->"
+    assert "figures: a: 'x'" in capsys.readouterr().err
+    assert figures.main(["b"]) == 0
+
+
+def test_code_that_is_not_committed_and_no_git_are_one_line(bench, monkeypatch):
+    monkeypatch.setattr(figures_history, "uncommitted", lambda paths: ["src/a.py"])
+    with pytest.raises(ValueError, match=r"^b: commit src/a\.py first, "):
+        figures.main(["b"])
+    monkeypatch.setattr(figures_history, "head", lambda: None)
+    with pytest.raises(ValueError, match=r"^figures are noted with the commit of their code: "):
+        figures.main(["b"])
+
+
+def test_commands_run_with_this_python_and_the_logs_at_hand(monkeypatch):
+    monkeypatch.setenv("FLOWNAV_DATA", "/logs")
+    assert figures.run("python -c \"print('../shared/data/x')\"") == "/logs/x\n"
+    with pytest.raises(RuntimeError, match=r"^`python -c 'raise SystemExit\(1\)'` ended with status 1$"):
+        figures.run("python -c 'raise SystemExit(1)'")
+
+
+@pytest.mark.parametrize(("status", "fine"), [(0, True), (1, True), (2, False), (-9, False)])
+def test_a_verdict_of_flownav_is_no_failure_and_bad_input_is(monkeypatch, status, fine):
+    monkeypatch.setattr(figures.subprocess, "run", lambda *a, **k: subprocess.CompletedProcess(a, status, "{}"))
+    if fine:
+        assert figures.run("flownav accuracy --json") == "{}"
+    else:
+        with pytest.raises(RuntimeError, match=f"^`flownav accuracy --json` ended with status {status}$"):
+            figures.run("flownav accuracy --json")
+
+
+@pytest.mark.parametrize("key", figures_table.PRODUCERS["accuracy"].figures)
+def test_figures_of_accuracy_are_of_the_case_and_of_the_flights_that_their_names_say(key):
+    read = figures_table.PRODUCERS["accuracy"].figures[key]
+    if key == "flights":
+        return
+    case = next(each for each in ("takeoff", "landing", "pad_return", "approach", "windy") if key.startswith(each))
+    matched = "dispersed" not in key if "p95" in key else "matched" in key
+    where = f"cases[case={'approach_8_m_s' if case == 'windy' else case}].{'matched' if matched else 'ensemble'}."
+    assert all(path.startswith(where) for path in (read.path, *read.interval))
 
 
 def test_what_only_names_is_run():

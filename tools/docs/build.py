@@ -38,7 +38,7 @@ def main(quick: bool) -> None:
     """
     shutil.rmtree(BUILT, ignore_errors=True)
     shutil.copytree(SOURCE, BUILT, ignore=shutil.ignore_patterns("*.py", "__pycache__", figures_book.BOOK.name))
-    figures_pages.fill_folder(BUILT, figures_book.read(), figures_history.stale)
+    fill_figures(BUILT)
     assets(BUILT / "assets")
     for name, generate in PAGES.items():
         (BUILT / name).parent.mkdir(parents=True, exist_ok=True)
@@ -47,6 +47,14 @@ def main(quick: bool) -> None:
         pictures.draw_all(BUILT / "pictures", [])
     write_tutorials(BUILT, quick)
     sys.exit(site())
+
+
+def fill_figures(folder: Path) -> None:
+    """Figures in place of their names. ValueError where a name is unknown; a line where a commit is."""
+    book = figures_book.read()
+    figures_pages.fill_folder(folder, book, figures_history.stale)
+    if unknown := figures_history.unknown(book.runs.values()):
+        print(f"figures of commits that this clone does not have are not marked: {', '.join(unknown)}", file=sys.stderr)
 
 
 def assets(folder: Path) -> None:

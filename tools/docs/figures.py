@@ -66,17 +66,20 @@ def machine() -> str:
 
 
 def run(line: str) -> str:
-    """What a command prints; 1 is a verdict, and fine. RuntimeError with the last line of what it said otherwise."""
-    words = [os.environ.get("FLOWNAV_DATA", DATA).join(word.split(DATA)) for word in shlex.split(line)]
+    """What a command prints, with the logs of $FLOWNAV_DATA. RuntimeError where it fails; flownav's status 1 is a verdict."""
+    words = [word.replace(DATA, os.environ.get("FLOWNAV_DATA", DATA)) for word in shlex.split(line)]
     first = {"flownav": [sys.executable, "-m", "flownav"], "python": [sys.executable]}.get(words[0], words[:1])
     done = subprocess.run([*first, *words[1:]], cwd=PROJECT, stdout=subprocess.PIPE, text=True, check=False)
-    if done.returncode > (words[0] == "flownav"):
+    if done.returncode not in ((0, 1) if words[0] == "flownav" else (0,)):
         raise RuntimeError(f"`{line}` ended with status {done.returncode}")
     return done.stdout
 
 
 def main(names: Iterable[str]) -> int:
-    """Measure, write the book after each producer, and the README; the exit status, 1 where one failed."""
+    """Measure, write the book after each producer, and the README; the exit status, 1 where one failed.
+
+    ValueError where there is no git, or code that is not committed.
+    """
     book, commit, failed = figures_book.read(), history.head(), 0
     if commit is None:
         raise ValueError("figures are noted with the commit of their code: run this in a clone, with git")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import subprocess
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
@@ -43,6 +44,14 @@ def _code(text: str) -> str:
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             node.body = node.body[ast.get_docstring(node, clean=False) is not None :]
     return ast.dump(tree)
+
+
+def unknown(runs: Iterable[Run], folder: Path = PROJECT) -> list[str]:
+    """The commits of runs that this clone does not have, as after a squash; none without git."""
+    if head(folder) is None:
+        return []
+    commits = sorted({run.commit for run in runs})
+    return [each for each in commits if git(folder, "cat-file", "-e", f"{each}^{{commit}}") is None]
 
 
 def uncommitted(paths: tuple[str, ...], folder: Path = PROJECT) -> list[str]:

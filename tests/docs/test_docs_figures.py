@@ -206,7 +206,15 @@ def test_without_git_and_of_an_unknown_commit_nothing_is_marked(clone, tmp_path_
     assert figures_history.changed_since("f" * 40, ("src",), folder) is None
     bare = tmp_path_factory.mktemp("sdist")
     assert figures_history.changed_since(first, ("src",), bare) is None
-    assert figures_history.head(bare) is None
+    assert figures_history.last_change(("src",), bare) is None
+
+
+def test_the_commit_of_the_code_is_the_last_that_changed_it(clone):
+    folder, commit = clone
+    first = commit("code.py", "x = 1\n")
+    second = commit("other.py", "x = 1\n")
+    assert first.startswith(figures_history.last_change(("src/code.py",), folder))
+    assert second.startswith(figures_history.last_change(("src",), folder))
 
 
 def test_commits_that_a_clone_does_not_have_are_named(clone, tmp_path_factory):
@@ -229,7 +237,7 @@ def test_what_is_not_committed_is_named(clone):
 PRINTED = {
     "cases": [
         {"case": "landing", "ensemble": {"p95_m": 9.0}},
-        {"case": "approach", "ensemble": {"p95_m": 0.25, "interval_m": [0.125, 0.5]}},
+        {"case": "approach", "ensemble": {"p95_m": 0.2504, "interval_m": [0.125, 0.5]}},
     ]
 }
 PRODUCER = figures_table.Producer("flownav accuracy", ("src",), {
@@ -277,7 +285,7 @@ def bench(tmp_path, monkeypatch):
     made = {name: figures_table.Producer(name, ("src",), {"x_m": figures_table.Read("x", "m", 1)}) for name in "ab"}
     monkeypatch.setattr(figures, "PRODUCERS", made)
     monkeypatch.setattr(figures, "README", tmp_path / "README.md")
-    monkeypatch.setattr(figures_history, "head", lambda: "abc12345")
+    monkeypatch.setattr(figures_history, "last_change", lambda paths: "abc12345")
     monkeypatch.setattr(figures_history, "uncommitted", lambda paths: [])
     book = tmp_path / "figures.json"
     monkeypatch.setattr(figures_book, "read", lambda read=figures_book.read: read(book))
@@ -301,7 +309,7 @@ def test_code_that_is_not_committed_and_no_git_are_one_line(bench, monkeypatch):
     monkeypatch.setattr(figures_history, "uncommitted", lambda paths: ["src/a.py"])
     with pytest.raises(ValueError, match=r"^b: commit src/a\.py first, "):
         figures.main(["b"])
-    monkeypatch.setattr(figures_history, "head", lambda: None)
+    monkeypatch.setattr(figures_history, "last_change", lambda paths: None)
     with pytest.raises(ValueError, match=r"^figures are noted with the commit of their code: "):
         figures.main(["b"])
 

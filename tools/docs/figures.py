@@ -43,7 +43,7 @@ def _of_readme(text: str) -> list[str]:
 
 
 def measure(name: str, producer: Producer, book: Book, commit: str, typed: Callable[[str], str]) -> None:
-    """Run a producer and put what it prints into the book.
+    """Run a producer and put what it prints into the book, with a digit more than pages show.
 
     `typed` runs a command line and returns what it prints. LookupError where a figure is not in it.
     """
@@ -51,7 +51,7 @@ def measure(name: str, producer: Producer, book: Book, commit: str, typed: Calla
     out = typed(line)
     printed: Any = None if producer.page else json.loads(out)
     found = {
-        f"{name}.{key}": Figure(float(at(printed, read.path)), read.unit, read.decimals, name,
+        f"{name}.{key}": Figure(round(float(at(printed, read.path)), read.decimals + 1), read.unit, read.decimals, name,
                                 interval_at(printed, read.interval))
         for key, read in producer.figures.items()
     }  # fmt: skip
@@ -66,7 +66,7 @@ def machine() -> str:
 
 
 def run(line: str) -> str:
-    """What a command prints, with the logs of $FLOWNAV_DATA. RuntimeError where it fails; flownav's status 1 is a verdict."""
+    """What a command prints, with the logs of $FLOWNAV_DATA. RuntimeError where it fails; flownav's 1 is a verdict."""
     words = [word.replace(DATA, os.environ.get("FLOWNAV_DATA", DATA)) for word in shlex.split(line)]
     first = {"flownav": [sys.executable, "-m", "flownav"], "python": [sys.executable]}.get(words[0], words[:1])
     done = subprocess.run([*first, *words[1:]], cwd=PROJECT, stdout=subprocess.PIPE, text=True, check=False)
@@ -80,11 +80,12 @@ def main(names: Iterable[str]) -> int:
 
     ValueError where there is no git, or code that is not committed.
     """
-    book, commit, failed = figures_book.read(), history.head(), 0
-    if commit is None:
-        raise ValueError("figures are noted with the commit of their code: run this in a clone, with git")
+    book, failed = figures_book.read(), 0
     for name in names:
         producer = PRODUCERS[name]
+        commit = history.last_change(producer.depends)
+        if not commit:
+            raise ValueError("figures are noted with the commit of their code: run this in a clone, with git")
         if changed := history.uncommitted(producer.depends):
             raise ValueError(f"{name}: commit {', '.join(changed[:3])} first, a figure is noted with its code's commit")
         print(f"figures: {name}: {producer.command}", file=sys.stderr)

@@ -48,7 +48,7 @@ def _code(text: str) -> str:
 
 def unknown(runs: Iterable[Run], folder: Path = PROJECT) -> list[str]:
     """The commits of runs that this clone does not have, as after a squash; none without git."""
-    if head(folder) is None:
+    if git(folder, "rev-parse", "HEAD") is None:
         return []
     commits = sorted({run.commit for run in runs})
     return [each for each in commits if git(folder, "cat-file", "-e", f"{each}^{{commit}}") is None]
@@ -59,9 +59,9 @@ def uncommitted(paths: tuple[str, ...], folder: Path = PROJECT) -> list[str]:
     return [line[3:] for line in (git(folder, "status", "--porcelain", "--", *paths) or "").splitlines()]
 
 
-def head(folder: Path = PROJECT) -> str | None:
-    """The present commit; None without git."""
-    return git(folder, "rev-parse", "--short=8", "HEAD")
+def last_change(paths: tuple[str, ...], folder: Path = PROJECT) -> str | None:
+    """The last commit that changed one of these paths: that of the code which stands there. None without git."""
+    return git(folder, "log", "-1", "--format=%h", "--abbrev=8", "--", *paths)
 
 
 def git(folder: Path, *arguments: str) -> str | None:

@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 unexport PYTHONDONTWRITEBYTECODE  # the tests start Python hundreds of times: what it made of NumPy and Numba is kept
 INSTALL := $(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test test-real-time test-random test-gpu test-slow long-log fuzz mutants league made-flights explain integrity witnesses rare validate weigh onboard digests pairs report-size install-size schemas lint bench bench-once docs pictures tutorials wheel wheel-test clean
+.PHONY: demo test test-real-time test-random test-gpu test-slow long-log fuzz mutants league made-flights explain integrity witnesses rare validate weigh onboard figures digests pairs report-size install-size schemas lint bench bench-once docs pictures tutorials wheel wheel-test clean
 
 demo: $(VENV)/.ready
 	$(BIN)/flownav fly --out out/sortie.fnr --force
@@ -64,6 +64,9 @@ weigh: $(VENV)/.ready
 
 onboard: $(VENV)/.ready-onboard
 	$(BIN)/python tools/onboard.py docs/explanation/onboard.md
+
+figures: $(VENV)/.ready
+	$(BIN)/python tools/docs/figures.py $(ONLY)
 
 digests: $(VENV)/.ready
 	$(BIN)/python tools/digests.py $(DIGESTS)

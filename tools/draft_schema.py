@@ -1,4 +1,4 @@
-"""Drafts the schema of a command's JSON object from objects that it printed, to be read and mended by hand.
+"""Drafts the schema of a command's JSON object from objects that it printed; it is then mended by hand.
 
 python tools/draft_schema.py NAME "WHAT THE COMMAND DOES" OBJECT.json [OBJECT.json...]
 """
@@ -11,9 +11,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from flownav.core.schemas import DRAFT
-
-FOLDER = Path(__file__).resolve().parents[1] / "src" / "flownav" / "data" / "schemas"
+COMMANDS = Path(__file__).resolve().parents[1] / "src" / "flownav" / "data" / "schemas" / "commands.json"
+WIDTH = 120  # columns of a line of it
 COUNTS = (
     "seed",
     "flights",
@@ -40,13 +39,13 @@ def kind_of(value: Any) -> str:
     return names.get(type(value), "object")
 
 
-def joined(values: Sequence[Any], name: str = "") -> dict[str, Any]:
-    """The schema that all of these fit; anything but the object itself may be null."""
-    kinds = {kind_of(value) for value in values}
+def joined(values: Sequence[Any], name: str = "") -> Any:
+    """The schema that all of these fit, as commands.json has it; anything but the object itself may be null."""
+    kinds = {kind_of(value) for value in values} - {"null"}
     if "integer" in kinds and ("number" in kinds or not name.endswith(COUNTS)):
         kinds = kinds - {"integer"} | {"number"}
-    kinds |= {"null"} if name else set()
-    found: dict[str, Any] = {"type": sorted(kinds) if len(kinds) > 1 else next(iter(kinds))}
+    types = "|".join(sorted(kinds)) + ("?" if name and kinds else "") or "null"
+    found: dict[str, Any] = {}
     objects = [value for value in values if isinstance(value, dict)]
     if objects and name in KEYED:
         inner = [each for one in objects for each in one.values()]
@@ -55,22 +54,46 @@ def joined(values: Sequence[Any], name: str = "") -> dict[str, Any]:
         keys = dict.fromkeys(key for one in objects for key in one)
         found["properties"] = {key: joined([one[key] for one in objects if key in one], key) for key in keys}
     listed = [each for value in values if isinstance(value, list) for each in value]
-    return found | ({"items": joined(listed, name.rstrip("s"))} if listed else {})
+    found |= {"items": joined(listed, name.rstrip("s"))} if listed else {}
+    return {"type": types, **found} if found else types
 
 
 def draft(name: str, what: str, values: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """The schema of a command's object. Keys that every object has are required."""
     body = joined(values)
-    body["properties"] = {"schema": {"const": 1}} | {k: v for k, v in body["properties"].items() if k != "schema"}
-    body["required"] = [
-        "schema",
-        *(key for key in body["properties"] if key != "schema" and all(key in v for v in values)),
-    ]
-    about = {"$schema": DRAFT, "$id": f"urn:flownav:schema:{name}:1", "title": f"flownav {name} --json"}
-    return {**about, "description": what, **body}
+    keys = [key for key in body["properties"] if key != "schema"]
+    body["properties"] = {"schema": {"const": 1}} | {key: body["properties"][key] for key in keys}
+    body["required"] = ["schema", *(key for key in keys if all(key in value for value in values))]
+    return {"title": f"flownav {name} --json", "description": what, **body}
+
+
+def dense(node: Any, indent: int = 0, before: int = 0) -> str:
+    """JSON whose lines are filled up to WIDTH. `before`: the columns that stand in front of the node."""
+    flat = json.dumps(node, ensure_ascii=False)
+    if before + len(flat) < WIDTH or not node or not isinstance(node, (dict, list)):
+        return flat
+    named = node.items() if isinstance(node, dict) else (("", each) for each in node)
+    rows: list[str] = []
+    for key, value in named:
+        head = f"{json.dumps(key)}: " if isinstance(node, dict) else ""
+        rows.append(head + dense(value, indent + 1, indent + 1 + len(head)))
+    opened, closed = "{}" if isinstance(node, dict) else "[]"
+    return f"{opened}\n{_filled(rows, ' ' * (indent + 1))}\n{' ' * indent}{closed}"
+
+
+def _filled(rows: Sequence[str], margin: str) -> str:
+    """Rows one after the other on a line while they fit on it; a row of several lines has lines of its own."""
+    lines = [rows[0]]
+    for row in rows[1:]:
+        if "\n" in lines[-1] + row or len(margin + lines[-1] + row) + 2 >= WIDTH:
+            lines.append(row)
+        else:
+            lines[-1] += f", {row}"
+    return ",\n".join(margin + line for line in lines)
 
 
 if __name__ == "__main__":
     name, what, *paths = sys.argv[1:]
     objects = [json.loads(Path(path).read_text(encoding="utf-8")) for path in paths]
-    (FOLDER / f"{name}.json").write_text(json.dumps(draft(name, what, objects), indent=1) + "\n", encoding="utf-8")
+    found = json.loads(COMMANDS.read_text(encoding="utf-8"))
+    COMMANDS.write_text(dense(found | {name: draft(name, what, objects)}) + "\n", encoding="utf-8")

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from command import printed
-from flownav.campaigns.accuracy import CASES, Target, flights_of, scenario_of
+from flownav.campaigns.accuracy import CASES, Target, _consistent, flights_of, scenario_of
 from flownav.campaigns.judged import (
     ablations,
     ageless,
@@ -192,7 +192,10 @@ def test_the_command_says_every_target_and_writes_what_it_prints(tmp_path):
     assert done.stdout.strip() == table.strip()
     assert "takeoff without" in done.stdout
     assert "96 flights" not in done.stdout  # 16 were flown
-    assert done.stdout.count("steps with the ANEES of 16 flights in its") == 4 + 2  # targets, two tables
+    assert done.stdout.count("steps with the ANEES of 16 flights in its") == 2  # a column of two tables
+    assert (
+        done.stdout.count("| ANEES, the squared errors over the stated ones ") == 8
+    )  # two limits, two cases, two truths
     for truth_model in ("matched", "ensemble"):
         assert f"{truth_model}: RMSE over the bound of the filter's own model, at the horizon" in done.stdout
         assert f"| {truth_model}: touchdown " in done.stdout
@@ -235,6 +238,16 @@ def test_a_target_is_kept_on_its_side_and_not_by_nan():
     assert not Target("matched", "x", np.nan, 1.0).kept
     assert not Target("matched", "x", np.nan, 1.0, at_least=True).kept
     assert Target("ensemble", "error [m]", 0.5, 0.4).sentence() == "ensemble: error [m] 0.500, at most 0.4"
+
+
+@pytest.mark.parametrize(("anees", "kept"), [
+    (0.79, [False, True]), (0.8, [True, True]), (1.15, [True, True]), (1.16, [True, False]), (None, [True, False]),
+])  # fmt: skip
+def test_errors_may_be_a_little_smaller_or_larger_than_stated(anees, kept):
+    targets = _consistent("ensemble", {"anees": anees})
+    assert [target.kept for target in targets] == kept
+    assert [target.at_least for target in targets] == [True, False]
+    assert {target.truth_model for target in targets} == {"ensemble"}
 
 
 def test_the_progress_bar_knows_how_many_flights_there_are():

@@ -15,10 +15,13 @@ README = (PROJECT / "README.md").read_text(encoding="utf-8")
 FLIGHTS = 96
 
 
+FIGURE = re.compile(
+    r"^- \*\*<!-- figure certify\.asked_m -->([\d.]+) m<!-- end -->\*\* from the pad's centre at rest", re.M
+)
+
+
 def figure_m() -> float:
-    return float(
-        re.search(r"^- \*\*([\d.]+) m\*\* from the pad's centre at rest with 95 % probability", README, re.M)[1]
-    )
+    return float(FIGURE.search(README)[1])
 
 
 def test_readme_requirement_and_accuracy_page_say_one_figure():

@@ -119,7 +119,7 @@ def test_everything_that_is_no_code_ships_too(plain_wheel):
     with zipfile.ZipFile(plain_wheel) as file:
         shipped = set(file.namelist())
     assert data <= shipped
-    assert {"flownav/data/samples/flight.toml", "flownav/data/schemas/file-sensor.json", "flownav/py.typed"} <= shipped
+    assert {"flownav/data/samples/flight.toml", "flownav/data/schemas/commands.json", "flownav/py.typed"} <= shipped
     assert {"flownav/report/vendor/plotly.min.js", "flownav/report/vendor/plotly.LICENSE"} <= shipped
     assert not any(name.startswith(("tests/", "docs/")) for name in shipped)
 

@@ -11,7 +11,7 @@ import pytest
 
 import flownav
 from command import run
-from flownav.core.schemas import schema_of
+from flownav.cli.schemas import schema_of
 from flownav.report.html import render
 from planted.planted import written
 from planted_logs import fault, sound

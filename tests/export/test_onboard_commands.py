@@ -17,7 +17,7 @@ from command import run
 from fed_records import queue_of_flight, record_of
 from flownav.api.building import flight_of, interface
 from flownav.cli import options
-from flownav.core.schemas import schema_of
+from flownav.cli.schemas import schema_of
 from flownav.export.onboard import targets
 from flownav.export.onboard.board import Board
 from flownav.export.onboard.code import WITHOUT

@@ -11,6 +11,11 @@ if str(TOOLS) not in sys.path:
     sys.path.insert(0, str(TOOLS))
 
 import cells  # noqa: E402
+import figures  # noqa: E402
+import figures_book  # noqa: E402
+import figures_history  # noqa: E402
+import figures_pages  # noqa: E402
+import figures_table  # noqa: E402
 import mathematics  # noqa: E402
 import notebooks  # noqa: E402
 import pictures  # noqa: E402
@@ -23,6 +28,7 @@ import reference_tables  # noqa: E402
 import units  # noqa: E402
 
 __all__ = [
-    "cells", "mathematics", "notebooks", "pictures", "readme_picture", "reference", "reference_api",
-    "reference_commands", "reference_keys", "reference_tables", "units",
+    "cells", "figures", "figures_book", "figures_history", "figures_pages", "figures_table", "mathematics",
+    "notebooks", "pictures", "readme_picture", "reference", "reference_api", "reference_commands", "reference_keys",
+    "reference_tables", "units",
 ]  # fmt: skip

@@ -1,8 +1,9 @@
-"""The published schemas: what ships is what the models are, and what commands print is what their schemas say."""
+"""The published schemas: no key of a file is taken back, and what commands print is what their schemas say."""
 
 from __future__ import annotations
 
 import json
+import math
 import tomllib
 from functools import cache
 from pathlib import Path
@@ -12,12 +13,15 @@ import pytest
 import typer.main
 from typer.testing import CliRunner
 
+from draft_schema import COMMANDS as COMMANDS_FILE
+from draft_schema import dense, draft
 from flownav.cli import app
+from flownav.cli.schemas import MODELS, _in_full, names, schema_of, title_of
+from flownav.core.errors import InputError
 from flownav.core.parameter_files import shipped
 from flownav.core.record import Record
-from flownav.core.schemas import names, schema_of
 from replay_logs import log_of_flight
-from schemas import generated
+from schemas import Key, broken, keys_of, read, written
 
 COMMANDS = set(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
 FILES = {
@@ -48,9 +52,83 @@ def test_a_schema_is_one_and_carries_its_number(name):
     assert found["$id"] == f"urn:flownav:schema:{name}:1"
 
 
-@pytest.mark.parametrize("name", generated())
-def test_what_ships_is_what_the_models_are(name):
-    assert schema_of(name) == generated()[name], "make schemas"
+@pytest.mark.parametrize("name", names())
+def test_the_list_has_the_title_of_the_schema(name):
+    assert title_of(name) == schema_of(name)["title"]
+
+
+def test_a_name_that_is_none_is_one_line():
+    with pytest.raises(InputError, match=r"^file-nothing: no such schema; choose from accuracy, .*, view$"):
+        schema_of("file-nothing")
+
+
+# -- those of files: what was published is kept -----------------------------------------------------------------
+PUBLISHED = read()
+KEY = Key(["number"], 0.0, 10.0, False)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_no_published_key_is_taken_back_and_new_ones_are_noted(name):
+    now = keys_of(schema_of(name))
+    assert not list(broken(PUBLISHED[name], now))
+    assert PUBLISHED[name] == now, "make schemas"
+
+
+def test_published_keys_know_ranges_lists_and_what_must_be_there():
+    assert PUBLISHED["file-scenario"]["flight.duration_s"] == Key(["number", "provenance"], 0.1, 3600.0, False)
+    assert PUBLISHED["file-requirement"]["requirement[].at_most"].types == ["null", "number", "provenance"]
+    assert PUBLISHED["file-multirotor"]["kind"] == Key(["=multirotor"], -math.inf, math.inf, True)
+
+
+@pytest.mark.parametrize(("now", "says"), [
+    ({}, ["a.b: is gone"]),
+    ({"a.b": KEY._replace(types=["integer"])}, ["a.b: may no longer be number"]),
+    ({"a.b": KEY._replace(low=0.1)}, ["a.b: takes 0.1 to 10, and took 0 to 10"]),
+    ({"a.b": KEY._replace(high=9.0)}, ["a.b: takes 0 to 9, and took 0 to 10"]),
+    ({"a.b": KEY._replace(required=True)}, ["a.b: must be there now"]),
+    ({"a.b": KEY, "c": KEY._replace(required=True)}, ["c: is new and must be there"]),
+    ({"a.b": Key(["number", "string"], -1.0, 11.0, False), "c": KEY, "d.e": KEY._replace(required=True)}, []),
+], ids=["gone", "type", "low", "high", "required", "new and required", "wider"])  # fmt: skip
+def test_what_breaks_a_published_schema_is_a_line(now, says):
+    assert list(broken({"a.b": KEY}, now)) == says
+
+
+def test_published_keys_are_written_as_they_are_read(tmp_path):
+    noted = {"x": {"a": KEY, "b": Key(["=tail rotor stuck", "null"], -math.inf, math.inf, True)}}
+    path = tmp_path / "keys.json"
+    path.write_text(written(noted), encoding="utf-8")
+    assert read(path) == noted
+
+
+# -- those of commands: short, and in full ----------------------------------------------------------------------
+def test_a_short_schema_in_full():
+    shared = {"pair": {"type": "array?", "items": "number"}}
+    short = {"type": "object", "properties": {"a": "string|number?", "b": "#pair"}, "additionalProperties": False}
+    assert _in_full(short, shared) == {
+        "type": "object",
+        "properties": {
+            "a": {"type": ["null", "number", "string"]},
+            "b": {"type": ["array", "null"], "items": {"type": "number"}},
+        },
+        "additionalProperties": False,
+    }
+
+
+def test_the_file_of_commands_is_dense_and_shares_only_what_several_use():
+    text = COMMANDS_FILE.read_text(encoding="utf-8")
+    found = json.loads(text)
+    assert dense(found) + "\n" == text
+    assert all(text.count(f'"#{name}"') > 1 for name in found["shared"])
+
+
+def test_a_draft_fits_what_it_was_drafted_from():
+    printed = [{"schema": 1, "a": 1.5, "flights": 3, "told": {"x": 1.0}}, {"schema": 1, "a": 2, "b": [{"c": "d"}]}]
+    schema = _in_full(draft("x", "An example.", printed), {})
+    for each in printed:
+        jsonschema.validate(each, schema)
+    assert schema["required"] == ["schema", "a"]
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(printed[0] | {"flights": 2.5}, schema)
 
 
 @pytest.mark.parametrize(("name", "file"), [(name, file) for name, files in FILES.items() for file in files])

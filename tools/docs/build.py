@@ -1,7 +1,8 @@
 """The documentation's site, `make docs`: the pages of docs/, what is generated from the code, and executed tutorials.
 
 docs/ is copied to out/docs-pages, which mkdocs.yml names; generated pages, remade pictures and the tutorials with
-what they printed are written there, so that none of them can be stale and none is committed. Then zensical makes the
+what they printed are written there, so that none of them can be stale and none is committed. Figures that pages name
+are filled in from docs/figures.json, and marked where their code has changed since. Then zensical makes the
 site in out/docs. A page with a broken link, a generator that fails and a tutorial whose cell raises fail the build.
 `--quick` takes the pictures as they are committed and leaves the tutorials unexecuted: their pages have words and code.
 """
@@ -15,6 +16,9 @@ import sys
 from pathlib import Path
 
 import cells
+import figures_book
+import figures_history
+import figures_pages
 import notebooks
 import pictures
 import ziamath
@@ -27,9 +31,14 @@ SOURCE, BUILT = PROJECT / "docs", PROJECT / "out" / "docs-pages"
 
 
 def main(quick: bool) -> None:
-    """Build the site. Raises RuntimeError where a tutorial fails, SystemExit with zensical's status where that does."""
+    """Build the site.
+
+    Raises RuntimeError where a tutorial fails, ValueError where a page names a figure that is unknown, SystemExit with
+    zensical's status where that fails.
+    """
     shutil.rmtree(BUILT, ignore_errors=True)
-    shutil.copytree(SOURCE, BUILT, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
+    shutil.copytree(SOURCE, BUILT, ignore=shutil.ignore_patterns("*.py", "__pycache__", figures_book.BOOK.name))
+    fill_figures(BUILT)
     assets(BUILT / "assets")
     for name, generate in PAGES.items():
         (BUILT / name).parent.mkdir(parents=True, exist_ok=True)
@@ -38,6 +47,14 @@ def main(quick: bool) -> None:
         pictures.draw_all(BUILT / "pictures", [])
     write_tutorials(BUILT, quick)
     sys.exit(site())
+
+
+def fill_figures(folder: Path) -> None:
+    """Figures in place of their names. ValueError where a name is unknown; a line where a commit is."""
+    book = figures_book.read()
+    figures_pages.fill_folder(folder, book, figures_history.stale)
+    if unknown := figures_history.unknown(book.runs.values()):
+        print(f"figures of commits that this clone does not have are not marked: {', '.join(unknown)}", file=sys.stderr)
 
 
 def assets(folder: Path) -> None:
@@ -69,5 +86,5 @@ def site() -> int:
 if __name__ == "__main__":
     try:
         main("--quick" in sys.argv[1:])
-    except RuntimeError as error:
+    except (RuntimeError, ValueError) as error:
         sys.exit(f"make docs: {error}")

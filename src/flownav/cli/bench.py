@@ -43,7 +43,7 @@ def _asked(row: dict[str, Any]) -> str:
 
 
 def _complete(incomplete: str) -> list[str]:
-    from flownav.core.schemas import names
+    from flownav.cli.schemas import names
 
     return [name for name in names() if name.startswith(incomplete)]
 
@@ -61,12 +61,12 @@ def schema(
     as_json: options.Json = False,
 ) -> None:
     """Print the JSON schema of a command's --json object (by the command's name), or of a file; or list them."""
-    from flownav.core.schemas import names, schema_of
+    from flownav.cli.schemas import id_of, names, schema_of, title_of
 
     if name is not None:
         typer.echo(json.dumps(schema_of(name), indent=1))
     elif as_json:
-        emit({"schemas": [{"name": each, "id": schema_of(each)["$id"]} for each in names()]})
+        emit({"schemas": [{"name": each, "id": id_of(each)} for each in names()]})
     else:
         for each in names():
-            typer.echo(f"{each:<18} {schema_of(each).get('title', '')}")
+            typer.echo(f"{each:<18} {title_of(each)}")

@@ -31,7 +31,7 @@ from flownav.vehicle.kinds import vehicle_file
 from flownav.vehicle.parameters import MultirotorParameters
 
 PAGE, FACTS = "certificate.html", "certificate.json"
-SCHEMA = 1  # schemas/certificate.json defines its content
+SCHEMA = 1  # `flownav schema certificate` prints what it holds
 
 
 def write_certificate(

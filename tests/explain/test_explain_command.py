@@ -83,5 +83,5 @@ def test_a_log_that_is_none_is_one_line(tmp_path, log, words):
 
 
 def test_python_refuses_an_unknown_autopilot(turned):
-    with pytest.raises(flownav.InputError, match="px4 or ardupilot"):
-        flownav.explain(turned, autopilot="inav")
+    with pytest.raises(flownav.InputError, match="px4, ardupilot or inav"):
+        flownav.explain(turned, autopilot="betaflight")

@@ -28,6 +28,8 @@ PLANTED = (
     ("own", "inertial unit restarts"),
     ("own", "reported as landed while it hovers low"),
     ("own", "flow never switched on"),
+    ("own", "flow stamped with two thirds of its time"),
+    ("own", "a shadow of the airframe in the flow's picture"),
     ("forum", "range is height reference, no GPS"),
     ("forum", "switched to flow too high up"),
     ("forum", "rangefinder hangs"),
@@ -101,7 +103,7 @@ def test_without_parameters_their_causes_are_missing_and_not_guessed(tmp_path):
     explained = explain(log)
     assert {"height_noise", "source_never_switched", "flow_refused"} <= {name for name, _ in explained.missing}
     assert explained.dialect == ""
-    with pytest.raises(ValueError, match="px4 or ardupilot"):
+    with pytest.raises(ValueError, match="px4, ardupilot or inav"):
         explained.cure_text()
 
 

@@ -95,6 +95,18 @@ def flow_scaled(streams: Streams, case: Case, x: float, y: float) -> None:
     _set(streams, Sensor.FLOW_RATE, one.value * np.array([x, y, 1.0, 1.0]), case.inside(one))
 
 
+def flow_over_time(streams: Streams, case: Case, factor: float) -> None:
+    """The angles of flow and gyro are divided by a time that is wrong by a factor."""
+    one = streams[Sensor.FLOW_RATE]
+    _set(streams, Sensor.FLOW_RATE, one.value / factor, case.inside(one))
+
+
+def flow_offset(streams: Streams, case: Case, x: float, y: float) -> None:
+    """The flow reads so much where nothing moves [rad/s]; its gyro stays right."""
+    one = streams[Sensor.FLOW_RATE]
+    _set(streams, Sensor.FLOW_RATE, one.value + np.array([x, y, 0.0, 0.0]), case.inside(one))
+
+
 def flow_late(streams: Streams, case: Case, by_s: float) -> None:
     """Flow and gyro come so much later than ever, stamped on arrival as before."""
     one = streams[Sensor.FLOW_RATE]
@@ -356,6 +368,8 @@ WAYS: dict[str, Callable[..., None]] = {
         flow_flipped,
         flow_swapped,
         flow_scaled,
+        flow_over_time,
+        flow_offset,
         flow_late,
         flow_stamped,
         flow_drifts,

@@ -12,7 +12,7 @@ from flownav.core.errors import InputError, arg
 if TYPE_CHECKING:
     from flownav.studies.explain.judge import Explanation
 
-AUTOPILOTS = ("px4", "ardupilot")
+AUTOPILOTS = ("px4", "ardupilot", "inav")
 
 
 @checked
@@ -25,9 +25,9 @@ def explain(
 ) -> Explanation:
     """Why a recorded flight drifted: the causes with their seconds, how sure each is, and what cures it.
 
-    log: any log that `flownav info` reads. autopilot: px4 or ardupilot, whose parameters cure it, where the log has
-    none of its own that say. flow_instance: which of several flow sensors. topics: of a ROS bag, which topic serves as
-    what. An `Explanation` has `verdict` (one sentence), `first` and `findings` (each with sentence, window_s,
+    log: any log that `flownav info` reads. autopilot: px4, ardupilot or inav, whose parameters cure it, where the log
+    has none of its own that say. flow_instance: which of several flow sensors. topics: of a ROS bag, which topic
+    serves as what. An `Explanation` has `verdict` (one sentence), `first` and `findings` (each with sentence, window_s,
     probability, figures, pictures and cure), `checked` (every hypothesis that was looked into) and `missing` (what
     the log lacks for the others). InputError, one line, where the log or an option cannot serve.
 
@@ -38,7 +38,7 @@ def explain(
         True
     """
     if autopilot is not None and autopilot not in AUTOPILOTS:
-        raise InputError(f"{arg('autopilot')} {autopilot}: {' or '.join(AUTOPILOTS)} are possible")
+        raise InputError(f"{arg('autopilot')} {autopilot}: {', '.join(AUTOPILOTS[:-1])} or {AUTOPILOTS[-1]} are possible")
 
     from flownav.core.compile import announce_compilation
     from flownav.logs.open_log import open_log

@@ -38,7 +38,7 @@ def _explains(row: dict[str, Any]) -> str:
 
 def command(
     log: options.Log,
-    autopilot: Annotated[str | None, chosen(FOR, *options.AUTOPILOTS, flag="--for", unset="the log's own")] = None,
+    autopilot: Annotated[str | None, chosen(FOR, *options.SCALED_FLOW, flag="--for", unset="the log's own")] = None,
     flow_instance: options.FlowInstance = None,
     topic: options.Topic = None,
     out: Annotated[

@@ -21,7 +21,7 @@ from flownav.lab.identification.experiment import Experiment, experiment
 from flownav.lab.identification.findings import Findings, Noise, Response, noise_of
 from flownav.lab.identification.first_look import Axes, judged
 from flownav.lab.identification.flight import Flight
-from flownav.lab.identification.offset import flow_offset, without
+from flownav.lab.identification.offset import Offset, flow_offset, without
 from flownav.lab.identification.output_error import Z_95, fit
 from flownav.lab.identification.own_gyro import own_gyro
 from flownav.lab.identification.quantities import Interval, choose, cross_validation, latency
@@ -34,6 +34,7 @@ from flownav.lab.identification.reference_motion import (
     with_flow,
 )
 from flownav.lab.identification.scale import Match, against_speed, match
+from flownav.logs.log import Log
 from flownav.logs.open_log import open_flight
 
 CLUSTER_S = 3.0
@@ -55,23 +56,33 @@ class Scale(NamedTuple):
     method: str
 
 
+class Measured(NamedTuple):
+    """A flight held against its reference: the flow's raw axes, and those put right; its velocity with axes and offset
+    put right (n, 2) [m/s]; its response, the track that it was matched on (None of a velocity), and its offset.
+    """
+
+    flown: Flight
+    moved: Motion
+    raw: Array
+    axes: Axes
+    put_right: Array
+    scale: Scale
+    track: Match | None
+    offset: Offset | None
+
+    @property
+    def gains(self) -> tuple[Interval, Interval]:
+        """Gains of forward velocity and of velocity to the right, with 95 % intervals that no length of log narrows."""
+        x, y = (_doubted(self.scale, self.flown, axis) for axis in (0, 1))
+        return x, y
+
+
 def identify_flight(
     path: Path, candidates: Sequence[Structure], reference: str = "auto", flow_instance: int | None = None
 ) -> Findings:
     """Findings of one flight log. InputError names what is missing."""
     log = open_flight(path, flow_instance=flow_instance)
-    flown, moved, raw, axes = judged(log, reference)
-    _check_alike(flown, moved)
-    age_s = _age(flown, moved)
-    put_right = flown.velocity_m_s @ axes.assignment  # assignment is orthogonal: its transpose undoes it
-    if not axes.right:
-        moved = with_flow(moved, flown, put_right)
-        age_s = _age(flown, moved)
-    scale, track = _scale(flown, moved, age_s, put_right)
-    offset = flow_offset(flown, moved, put_right, scale.response, age_s)
-    if offset is not None and offset.matters:
-        put_right = without(put_right, flown.range_m, offset)
-        scale, track = _scale(flown, moved, age_s, put_right)
+    flown, moved, raw, axes, put_right, scale, track, offset = measured(log, reference)
     runs = [_axis_run(flown, moved, put_right, axis) for axis in (0, 1)]
     structures = candidates if len(candidates) == 1 else FLIGHT_ORDERS
     responses = []
@@ -102,6 +113,23 @@ def identify_flight(
         own_gyro(log),
         log.parameters,
     )
+
+
+def measured(log: Log, reference: str = "auto") -> Measured:
+    """The flow's axes, response and offset against a reference: "auto", "truth", "gps". InputError: none, or unlike."""
+    flown, moved, raw, axes = judged(log, reference)
+    _check_alike(flown, moved)
+    age_s = _age(flown, moved)
+    put_right = flown.velocity_m_s @ axes.assignment  # assignment is orthogonal: its transpose undoes it
+    if not axes.right:
+        moved = with_flow(moved, flown, put_right)
+        age_s = _age(flown, moved)
+    scale, track = _scale(flown, moved, age_s, put_right)
+    offset = flow_offset(flown, moved, put_right, scale.response, age_s)
+    if offset is not None and offset.matters:
+        put_right = without(put_right, flown.range_m, offset)
+        scale, track = _scale(flown, moved, age_s, put_right)
+    return Measured(flown, moved, raw, axes, put_right, scale, track, offset)
 
 
 def _check_alike(flown: Flight, moved: Motion) -> None:

@@ -9,6 +9,8 @@ import numpy as np
 from flownav.core.errors import InputError
 from flownav.core.frames import to_body
 from flownav.core.measurement import Array, Sensor, Stream
+from flownav.lab.identification.flight_identification import Measured, measured
+from flownav.lab.identification.own_gyro import OwnGyro, own_gyro
 from flownav.logs.happened import CLIPPING, FUSES_FLOW, SOURCE_SET, VIBRATION
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import ReplayOptions
@@ -228,6 +230,22 @@ class Case(Aloft):
         if mirrored or sure < 4.0 or fit.share < 0.2:
             return None
         return HeadingTie(-angle, fit.lag_s, sure)
+
+    # -- what identification measures ----------------------------------------------------------------------------
+    @cached_property
+    def measured(self) -> Measured | None:
+        """The flow's gains and offset against the log's reference, else GPS; None where neither shows them."""
+        if self.log.truth is None and self.gps_velocity is None:
+            return None
+        try:
+            return measured(self.log, "gps" if self.log.truth is None else "truth")
+        except (InputError, np.linalg.LinAlgError):
+            return None
+
+    @cached_property
+    def own_gyro(self) -> OwnGyro | None:
+        """How fast the flow sensor's own gyro turns beside the vehicle's."""
+        return own_gyro(self.log)
 
     # -- the autopilot -------------------------------------------------------------------------------------------
     def told_of(self, kind: str) -> list[tuple[float, float]]:

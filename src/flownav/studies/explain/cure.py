@@ -7,12 +7,12 @@ made up: the text states what to do.
 from collections.abc import Callable
 from typing import NamedTuple
 
-from flownav.lab.identification.parameter_file import FLOAT, INTEGER, Parameter, file_text
+from flownav.lab.identification.parameter_file import AUTOPILOTS, FLOAT, INTEGER, Parameter, file_text
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.sign import Sign
-from flownav.studies.explain.told import ARDUPILOT, PX4
+from flownav.studies.explain.told import ARDUPILOT, INAV, PX4
 
-SUFFIX = {PX4: ".params", ARDUPILOT: ".param"}
+SUFFIX = AUTOPILOTS
 
 
 class Cure(NamedTuple):
@@ -40,10 +40,15 @@ def decimal(name: str, value: float, reason: str) -> Parameter:
 
 
 def either(
-    dialect: str, px4: tuple[Parameter, ...], ardupilot: tuple[Parameter, ...], by_hand: str, holds: bool = True
+    dialect: str,
+    px4: tuple[Parameter, ...],
+    ardupilot: tuple[Parameter, ...],
+    by_hand: str,
+    holds: bool = True,
+    inav: tuple[Parameter, ...] = (),
 ) -> Cure:
     """The cure by the dialect of the log's autopilot."""
-    settings = {PX4: px4, ARDUPILOT: ardupilot}.get(dialect, ())
+    settings = {PX4: px4, ARDUPILOT: ardupilot, INAV: inav}.get(dialect, ())
     return Cure(settings, by_hand, holds and bool(settings))
 
 

@@ -1,12 +1,24 @@
 """Cures of a wrong setting of the flow sensor, or of a picture that it cannot read."""
 
+from flownav.lab.identification.parameter_file import FLOAT, INTEGER, within
+from flownav.lab.identification.scalers import INAV_DEFAULT
 from flownav.studies.explain.case import Case
-from flownav.studies.explain.cure import Cure, Settings, decimal, either, number, whole
+from flownav.studies.explain.cure import Cure, Settings, by_hand_only, decimal, either, number, whole
 from flownav.studies.explain.sign import Sign
+from flownav.studies.explain.told import INAV_SCALE
 
 EIGHTH_DEG, NEAR_EIGHTH_DEG = 45.0, 12.0
 PX4_OF_DELAY_MS, EKF3_DELAY_MS, EKF3_AVERAGING_MS = 300.0, 250.0, 50.0
 MOST_NOISE_RAD_S = 1.0  # the most that EK3_FLOW_M_NSE takes
+interval = by_hand_only(
+    "Mend the integration time in the sensor's driver or message: no scaler mends it, since autopilots scale the flow "
+    "and not the rotation that they take out of it."
+)
+offset = by_hand_only(
+    "Look for what turns with the body: a bias of the sensor's gyro, a reflection, a shadow, a dirty lens. `flownav "
+    "identify` writes the offset into the sensor file, and `--sensor` takes it out; neither PX4 nor ArduPilot has a "
+    "parameter for it."
+)
 SCALE_PX4, SCALER_ARDUPILOT = (0.5, 1.5), 800.0
 
 
@@ -29,17 +41,21 @@ def scale(case: Case, sign: Sign, dialect: str) -> Cure:
     """The factor on the flow."""
     x, y = number(sign, "x"), number(sign, "y")
     reason = f"the flow reads {sign.figures['read']}"
-    now = case.told.scale_x or 1.0
-    px4 = min(max(now / number(sign, "gain"), SCALE_PX4[0]), SCALE_PX4[1])
+    now, gain = case.told.scale_x or 1.0, number(sign, "gain")
     scalers = []
-    for axis, gain, was in (("X", x, case.told.scale_x or 1.0), ("Y", y, case.told.scale_y or 1.0)):
-        per_mille = min(max(1e3 * (was / gain - 1.0), -SCALER_ARDUPILOT), SCALER_ARDUPILOT)
-        scalers.append(whole(f"FLOW_F{axis}SCALER", round(per_mille), reason))
+    for axis, one, was in (("X", x, case.told.scale_x or 1.0), ("Y", y, case.told.scale_y or 1.0)):
+        per_mille = float(round(1e3 * (was / one - 1.0)))
+        name = f"FLOW_F{axis}SCALER"
+        scalers.append(within(name, per_mille, -SCALER_ARDUPILOT, SCALER_ARDUPILOT, INTEGER, reason))
     words = "Check the lens's focus and the range first: `flownav identify` gives the factor with its interval."
     if x != y:
-        words = f"PX4 has one factor for both axes: mend the driver. {words}"
-    settings = (decimal("SENS_FLOW_SCALE", px4, f"{reason} (PX4 1.16 and later)"),) if x == y else ()
-    return either(dialect, settings, tuple(scalers), words)
+        words = f"PX4 and INAV have one factor for both axes: mend the driver. {words}"
+    px4 = within("SENS_FLOW_SCALE", now / gain, *SCALE_PX4, FLOAT, f"{reason} (PX4 1.16 and later)")
+    counts = case.log.parameters.get(INAV_SCALE, INAV_DEFAULT)
+    known = "" if INAV_SCALE in case.log.parameters else "; where yours is another, set yours times the gain"
+    inav = decimal(INAV_SCALE, counts * gain, f"counts a degree: {counts:g} times the gain, as {reason}{known}")
+    one_factor = x == y
+    return either(dialect, (px4,) * one_factor, tuple(scalers), words, inav=(inav,) * one_factor)
 
 
 def delay(case: Case, sign: Sign, dialect: str) -> Cure:

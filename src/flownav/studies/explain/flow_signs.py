@@ -10,6 +10,8 @@ import numpy as np
 
 from flownav.core.frames import within_half_turn
 from flownav.core.measurement import Array
+from flownav.lab.identification.output_error import Z_95
+from flownav.lab.identification.quantities import Interval
 from flownav.studies.explain.case import FLOW_XY, QUICK_S, Case
 from flownav.studies.explain.sign import Found, Lack, Picture, Sign, Trace, Window, nothing
 from flownav.studies.explain.signals import Fit, at, high_pass, spread, turn_of
@@ -21,7 +23,7 @@ SIGNIFICANT = 4.0  # standard errors
 LEAST_RELIABLE, LEAST_LIKENESS, KNOWN_TO = 0.8, 0.9, 0.15
 MODEL_SIGMA = 0.05  # of a gain: what the expectation itself may be off by
 PARTS, LEAST_IN_PART = 3, 60
-UNEVEN = 1.2  # of one axis over the other
+UNEVEN, UNEVEN_SIGMA = 1.2, 3.0  # of one axis over the other, and by how many standard errors
 SURE = 5.0  # as strong as any sign needs to be
 GYRO_OFF, GYRO_BIAS_RAD_S, LEAST_GYRO_SHARE, TURNING_RAD_S = 0.40, 0.045, 0.3, 0.02
 
@@ -104,9 +106,29 @@ def _liveliest(t_s: Array, values: Array, window: Window) -> float:
 
 
 # -- scale ---------------------------------------------------------------------------------------------------------
+def referenced(case: Case) -> tuple[Interval, Interval] | None:
+    """The flow's gains about x and about y against a position reference; None without one that knows them to a tenth.
+
+    Velocity to the right is flow about x, forward velocity is flow about y.
+    """
+    if case.log.truth is None or case.measured is None:
+        return None
+    forward, right = case.measured.gains
+    known = all(sigma_of(gain) < KNOWN_TO * max(gain.value, 0.5) for gain in (forward, right))
+    return (right, forward) if known else None
+
+
+def sigma_of(interval: Interval) -> float:
+    """The standard error of a 95 % interval."""
+    return 0.5 * (interval.high - interval.low) / Z_95
+
+
 def gains(case: Case) -> list[tuple[float, float]]:
-    """The flow's gain and its standard error by each witness that knows it to a tenth."""
+    """The flow's gain and its standard error by each witness that knows it to a tenth; a position reference alone."""
     found = []
+    reference = referenced(case)
+    if reference is not None:
+        return [(gain.value, sigma_of(gain)) for gain in reference]
     if case.flow_fit is not None and case.expectation_reliability > LEAST_RELIABLE:
         gain, sigma = gain_of(case.flow_fit, uneven=_uneven(case) != 1.0)
         found.append((gain / case.expectation_reliability, float(np.hypot(sigma, MODEL_SIGMA))))
@@ -139,11 +161,19 @@ def scale(case: Case) -> Found:
     found = gains(case)
     if not found:
         return Lack("too little motion against a reference to know the flow's scale to a tenth")
-    gain, sigma = _agreed(found)
-    uneven = _uneven(case)
-    x, y = gain * uneven**0.5, gain / uneven**0.5
+    reference = referenced(case)
+    if reference is not None:
+        x, y, sigma = *(gain.value for gain in reference), max(map(sigma_of, reference))
+        if abs(np.log(x / y)) < UNEVEN_SIGMA * sigma * (1.0 / x**2 + 1.0 / y**2) ** 0.5:
+            x = y = float((x * y) ** 0.5)
+        gain = float((x * y) ** 0.5)
+    else:
+        gain, sigma = _agreed(found)
+        uneven = _uneven(case)
+        x, y = gain * uneven**0.5, gain / uneven**0.5
     off = max(*(abs(np.log(one)) - sigma / one for one in (gain, x, y)), 0.0)
-    off = min(off, *_lasting(case))
+    if reference is None:
+        off = min(off, *_lasting(case))
     figures: dict[str, float | str] = {"gain": gain, "x": x, "y": y, "sigma": sigma, "read": _read(gain, x, y)}
     return Sign(off / SCALE_OFF, case.flight_s, figures, (expected_picture(case),))
 

@@ -88,7 +88,7 @@ class Explanation(NamedTuple):
         """The parameter file against the causes, for the log's own autopilot or another. ValueError of no dialect."""
         chosen = dialect or self.dialect
         if not chosen:
-            raise ValueError("the log does not show whose parameters are needed: px4 or ardupilot")
+            raise ValueError("the log does not show whose parameters are needed: px4, ardupilot or inav")
         return text_of(chosen, [(one.sentence, one.cure) for one in self.findings])
 
 

@@ -128,7 +128,7 @@ def render(explained: Explanation, span_s: Window) -> str:
         headings=HEADINGS,
         lines=lines(explained),
         missing=[(words()[name]["title"], what) for name, what in explained.missing],
-        autopilot={"px4": "PX4", "ardupilot": "ArduPilot"}.get(explained.dialect, ""),
+        autopilot={"px4": "PX4", "ardupilot": "ArduPilot", "inav": "INAV"}.get(explained.dialect, ""),
         version=__version__,
         whys=[words()[one.name] for one in explained.findings],
         **linked_with(sections, shared, None, span_s),

@@ -7,7 +7,8 @@ PX4 from 1.14 on (EKF2_*_CTRL, EKF2_HGT_REF) and before (EKF2_AID_MASK, EKF2_HGT
 from collections.abc import Mapping
 from typing import NamedTuple
 
-PX4, ARDUPILOT, UNKNOWN = "px4", "ardupilot", ""
+PX4, ARDUPILOT, INAV, UNKNOWN = "px4", "ardupilot", "inav", ""
+INAV_SCALE = "opflow_scale"
 BARO, GPS, RANGE, VISION = "barometer", "GPS", "range", "vision"
 EKF3_AVERAGING_S = 0.05  # half of flowTimeDeltaAvg_ms, which EKF3 takes off beside EK3_FLOW_DELAY
 CENTIMETRE = 0.01
@@ -70,7 +71,7 @@ def dialect_of(parameters: Mapping[str, float]) -> str:
         return PX4
     if any(name.startswith(("EK3_", "EK2_", "AHRS_", "FLOW_", "RNGFND")) for name in parameters):
         return ARDUPILOT
-    return UNKNOWN
+    return INAV if INAV_SCALE in parameters else UNKNOWN
 
 
 def told(parameters: Mapping[str, float]) -> Told:

@@ -101,6 +101,20 @@ def rescaled(case: Case, sign: Sign) -> Repair:
     return _with(case, "flow rescaled", replace(one, value=value))
 
 
+def at_its_rate(case: Case, sign: Sign) -> Repair:
+    """Flow and its gyro over the factor by which their time is wrong."""
+    one = case.log.streams[Sensor.FLOW_RATE]
+    return _with(case, "flow over its own time", replace(one, value=one.value / _number(sign, "slope")))
+
+
+def without_offset(case: Case, sign: Sign) -> Repair:
+    """The flow less what it reads where nothing moves."""
+    one = case.log.streams[Sensor.FLOW_RATE]
+    value = one.value.copy()
+    value[:, :2] -= [_number(sign, "x"), _number(sign, "y")]
+    return _with(case, "flow less its offset", replace(one, value=value))
+
+
 def in_time(case: Case, sign: Sign) -> Repair:
     """The flow when it was taken."""
     one = case.log.streams[Sensor.FLOW_RATE]

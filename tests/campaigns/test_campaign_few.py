@@ -11,6 +11,8 @@ from flownav.campaigns.measures import FIGURES, ROW_COLUMNS, flights_needed
 from flownav.campaigns.summary import figures_of
 from flownav.cli.campaign_said import _of_figure
 from flownav.report.campaign import sentence as page_sentence
+from flownav.report.campaign_figures import Touchdowns, common_reach_m, tails
+from flownav.report.cloud_picture import cloud_picture
 
 
 @pytest.mark.parametrize(("name", "needed"), [("r50_m", 2), ("r95_m", 20), ("r997_m", 334), ("landed", 1)])
@@ -59,3 +61,14 @@ def test_the_page_names_the_flights_that_a_figure_needs_and_why_there_is_no_radi
     cell["figures"]["landed"] = landed
     assert "; the radius that 95 % touch within needs 20 flights." in page_sentence(cell)
     assert "no radius about the pad's centre holds 95 %" in page_sentence(cell | {"flights": 20})
+
+
+def test_a_page_without_any_radius_shows_where_its_flights_touched():
+    nothing = {name: dict.fromkeys(figure_of(20)) for name in ("r50_m", "r95_m", "r997_m")}
+    cell = {"label": "storm", "flights": 40, "figures": nothing}
+    touched = Touchdowns(np.array([-1.2, np.inf]), np.array([0.1, np.inf]), np.array([1.204, np.inf]), 3.0)
+    assert common_reach_m([cell], [touched]) > 1.204
+    assert "too few touched for a ring that holds half of all" in cloud_picture(cell, touched).words
+    assert "where 1 flight first touched" in cloud_picture(cell, touched).svg
+    (line,) = tails([cell], [touched]).drawing.data
+    assert line["mode"] == "lines+markers"

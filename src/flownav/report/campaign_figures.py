@@ -33,8 +33,14 @@ class Touchdowns(NamedTuple):
 
 
 def common_reach_m(cells: Sequence[dict[str, Any]], touched: Sequence[Touchdowns]) -> float:
-    """How far from the pad's centre the maps of all cells reach, so that they can be compared [m]: a pad at most."""
+    """How far from the pad's centre the maps of all cells reach, so that they can be compared [m]: a pad at most.
+
+    Of a cell of which no radius is known it is as far as its flights touched.
+    """
     radii = [cell["figures"][name]["value"] or 0.0 for cell in cells for name, _, _ in CIRCLES]
+    for cell, one in zip(cells, touched, strict=True):
+        if cell["figures"]["r95_m"]["value"] is None:
+            radii += one.distance_m[np.isfinite(one.distance_m)].tolist()
     return 1.15 * min(max([0.05, *radii]), max((one.pad_m for one in touched), default=1.0))
 
 
@@ -83,7 +89,8 @@ def tails(cells: Sequence[dict[str, Any]], touched: Sequence[Touchdowns]) -> Pan
         if len(kept):
             farthest = max(farthest, float(far[kept].max()))
             line = {"color": COLOUR[ROLES[number % len(ROLES)]], "width": 1.6, "shape": "hv"}
-            data.append({"type": "scatter", "mode": "lines", "name": cell["label"], "x": drawn(far[kept]),
+            mode = "lines" if len(kept) > 2 else "lines+markers"
+            data.append({"type": "scatter", "mode": mode, "name": cell["label"], "x": drawn(far[kept]),
                          "y": drawn(100.0 * beyond[kept]), "line": line, "hovertemplate": "%{y:.3g} %"})  # fmt: skip
     look = layout(360)
     look["xaxis"] = axis("distance from the pad's centre (m)")

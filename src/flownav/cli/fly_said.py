@@ -63,9 +63,8 @@ def show(facts: dict[str, Any], manifest: Mapping[str, Any], median: int) -> Non
     if "paper_percentile" in facts:
         say(_percentiles(facts["paper_percentile"]))
     which = f" (flight {median}, the one with the median largest error)" if many else ""
-    say(f"record  {facts['record']}{which}")
-    if "report" in facts:
-        say(f"report  {facts['report']}")
+    page = f"   report  {facts['report']}" if "report" in facts else ""
+    say(f"record  {facts['record']}{which}{page}", soft=True)
 
 
 def receiver(facts: Mapping[str, Any]) -> str:

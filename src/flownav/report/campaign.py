@@ -92,6 +92,8 @@ def sentence(cell: dict[str, Any]) -> str:
     figure = cell["figures"].get("r95_m")
     if figure is None:
         axis = cell["figures"]["p95_axis_m"]
+        if _is_few(axis, cell):
+            return f"{cell['flights']} flights; the error that 95 % stay within needs {axis['flights_needed']}."
         return f"In 95 % of {cell['flights']} flights no axis was more than {_with_interval(axis)} m off."
     landed = cell["figures"]["landed"]
     share = f"{100 * landed['value']:.2f} % ({100 * landed['low']:.2f} to {100 * landed['high']:.2f} %)"

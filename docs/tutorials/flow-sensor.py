@@ -38,12 +38,17 @@ print(sensor.verdict)
 
 # %%
 sensor.save("my-sensor.toml")
+rms_m = {}
 for name, chosen in (("as it comes", None), ("identified", "my-sensor.toml")):
     record = flownav.replay("samples/flight.ulg", gps_outages=[(30, 75)], sensor=chosen)
     outage = record.scores["outages"][0]
     print(f"{name:12s} {outage['horizontal_rms_m']:.2f} m rms, {outage['horizontal_max_m']:.2f} m at most")
+    rms_m[name] = outage["horizontal_rms_m"]
+assert rms_m["identified"] < rms_m["as it comes"]
 
 # %% [markdown]
+# The identified sensor drifts less. Both rows count from the moment of the cut: what GPS was off by until then, a slow
+# error of metres that is common to all estimates, is taken out, and the difference is what the identification is worth.
 # The gain costs less than one would think, because the filter learns the scale of the flow while it has GPS. The
 # sensor file gives it a better start and the right latency. Judge a sensor on another flight than the one that it
 # was identified from when you can. Here there is only one.

@@ -96,7 +96,8 @@ class SlowGps(ComplementaryFilter):
 # %% [markdown]
 # ## On a recorded flight
 #
-# The same class fuses logs. Its position is scored like ours.
+# The same class fuses logs. Its position is scored like ours: through a cut of GPS, from the moment of the cut, so that
+# the slow error of GPS itself, which is common to all filters, is taken out.
 
 # %% language="bash"
 # flownav sample ulog

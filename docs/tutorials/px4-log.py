@@ -42,7 +42,8 @@ record
 # ## How far would it drift without GPS?
 #
 # Cut GPS for a while and compare the position with what the log knows otherwise: the truth of a simulator, motion
-# capture, or GPS itself when it is back.
+# capture, or GPS itself when it is back. The error counts from the moment of the cut. What GPS was off by until then, a
+# slow error of metres, is common to every estimate that follows GPS; it is no drift and is taken out.
 
 # %%
 cut = flownav.replay("samples/flight.ulg", gps_outages=[(30, 75)])

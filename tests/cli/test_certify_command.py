@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from command import printed
 from flownav.cli import app
-from flownav.cli.certify import _index
+from flownav.cli.certify import _ranking
 from flownav.core.errors import InputError, VerdictError
 from requirements import ASKED, HEAD, WINDY, write
 
@@ -73,7 +73,7 @@ def test_a_pass_is_exit_status_0_and_everything_else_1(tmp_path):
     assert str(failed.exception).startswith("small: fail: no crash")
     assert failed.stdout.startswith("FAIL  small\n")
     assert "rank      " in failed.stdout
-    assert "known     never: first " in failed.stdout
+    assert "known     what nobody knows: first " in failed.stdout
 
 
 @pytest.mark.parametrize(
@@ -120,9 +120,14 @@ def test_a_plan_of_what_cannot_be_flown_is_refused_as_the_flights_are(tmp_path, 
 
 
 def test_an_index_of_too_few_rows_is_no_figure():
-    known = {"input": "wind", "first": 0.3, "first_interval": [0.2, 0.4], "total": 0.5, "total_interval": [0.4, 0.6]}
-    assert _index(known, "input") == "wind: first 0.30 (0.20 to 0.40), total 0.50 (0.40 to 0.60)"
+    known = {"input": "wind.from_direction_deg", "known": "day",
+             "first": 0.3, "first_interval": [0.2, 0.4], "total": 0.5, "total_interval": [0.4, 0.6]}  # fmt: skip
     half = known | {"first": -0.29, "first_interval": [-0.9, 0.4]}
-    assert _index(half, "input") == "wind: first unknown, total 0.50 (0.40 to 0.60)"
     few = half | {"total": 1.36, "total_interval": [0.8, 2.0]}
-    assert _index(few, "input") == "wind: first unknown, total unknown: too few rows, give a larger --ranking"
+    assert _ranking({"ranking": [known, half], "split": [few]}) == [
+        "rank      wind from (°): first 0.30 (0.20 to 0.40), total 0.50 (0.40 to 0.60)",
+        "rank      wind from (°): first unknown, total 0.50 (0.40 to 0.60)",
+        "known     all that is known on the day: first unknown, total unknown",
+    ]
+    nothing = ["rank      too few rows to rank any input; give a larger --ranking"]
+    assert _ranking({"ranking": [few, few], "split": [few]}) == nothing

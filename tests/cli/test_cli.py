@@ -116,7 +116,7 @@ def test_a_flight_that_ends_before_the_hand_over_has_null_errors_and_a_table(tmp
     assert set(facts["states"]["w"].values()) == {None}
     shown = run("fly", path, "--force", cwd=tmp_path)
     assert shown.returncode == 0, shown.stderr
-    assert "known without error  its position in hover for the first 9 s" in shown.stdout
+    assert "known without error: its position in hover for the first 9 s" in shown.stdout
     assert (tmp_path / "out" / "landing.html").exists()
 
 

@@ -50,7 +50,7 @@ if early:
     begin_beside("parts", early)
 begun = list(beside._begun.values())
 done = []
-with meanwhile(lambda: done.append("meanwhile")), announce_compilation("test"):
+with meanwhile(lambda: done.append("meanwhile")), announce_compilation("test", os.environ.get("FOR", "")):
     compile_beside(SHIFT, apply, 0, p, whole=os.environ.get("WHOLE", ""))
     made = "elsewhere" if not SHIFT.is_ready and STORE.holds(SHIFT.file_name()) else "here"
     apply(SHIFT.address, p)
@@ -104,6 +104,11 @@ def left_over(place: Path) -> list[Path]:
 def test_what_both_are_together_is_said_once_in_words_for_people(run, place):
     said = run(place, WHOLE="the simulator, once, about 30 s")[1]
     assert said == ["flownav: compiling the simulator, once, about 30 s ...", "flownav: compiled 2 kernels"]
+
+
+def test_a_block_says_once_what_it_compiles_for_and_no_names_of_parts(run, place):
+    said = run(place, FOR="what a replay needs, once, about 20 s", WHOLE="the simulator")[1]
+    assert said == ["flownav: compiling what a replay needs, once, about 20 s ...", "flownav: compiled 2 kernels"]
 
 
 def test_both_are_compiled_side_by_side_and_only_once(run, place):

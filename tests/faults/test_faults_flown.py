@@ -123,6 +123,13 @@ def test_a_vehicle_without_a_fault_lands_and_nothing_is_said(rows):
     assert row["largest_error_m"] < 1.5
 
 
+def test_with_a_pad_camera_a_vehicle_without_a_fault_lands_as_the_demo_does(rows):
+    led, alone = rows["none, pad camera", 0.0], rows["none", 0.0]
+    assert (led["landed"], led["crashed"]) == (16, 0)
+    assert led["off_pad_m"]["worst"] < 0.05
+    assert led["off_pad_m"]["median"] < 0.25 * alone["off_pad_m"]["median"]
+
+
 def test_a_jump_of_gps_is_noticed_and_the_pad_stays_where_flow_has_it(rows, flown):
     row = rows["gps_jump", 20.0]
     assert row["landed"] == 16
@@ -176,10 +183,11 @@ def test_json_has_what_became_of_the_flights():
     facts = json.loads(done.stdout)
     assert (facts["closed_loop"], facts["flights"], facts["truth_model"]) == (True, 3, "ensemble")
     assert [(row["fault"], row["duration_s"], row["flights"]) for row in facts["rows"]] == [
+        ("none, pad camera", 0.0, 3),
         ("none", 0.0, 3),
         ("gps_loss", 5.0, 3),
     ]
-    assert set(facts["rows"][1]) == {
+    assert set(facts["rows"][2]) == {
         "fault", "height_m", "duration_s", "flights", "noticed", "said", "largest_error_unsaid_m", "largest_error_m",
         "landed", "went_around", "crashed", "unfinished", "off_pad_m",
     }  # fmt: skip
@@ -189,9 +197,13 @@ def test_the_table_says_landed_around_and_crashed():
     done = command("--faults", "gps_loss", "--heights", "1.5", "--durations", "5", "--flights", "3")
     assert done.exit_code == 0, done.output
     lines = [line for line in done.stdout.splitlines() if "gps_loss" in line]
-    cells = [cell.strip() for line in lines for cell in line.strip("│ ").split("│") if cell.strip() != "gps_loss"]
-    assert cells[:2] == ["1.5", "5"]
-    assert cells[6:9] == ["3", "0", "0"]  # landed, around, crashed: in two tables where 80 columns do not hold one
+    rows = [[cell.strip() for cell in line.strip("│ ").split("│")] for line in lines]
+    assert all(row[:3] == ["gps_loss", "1.5", "5"] for row in rows)  # of each table where 80 columns do not hold one
+    cells = [cell for row in rows for cell in row[3:]]
+    assert cells[:2] == ["never", "never"]  # noticed, warned
+    assert cells[4:7] == ["3", "0", "0"]  # landed, around, crashed
+    assert "scenario pad_return, wind 4 m/s" in " ".join(done.stdout.split())
+    assert not any("0: -" in line for line in done.stdout.splitlines())
 
 
 def test_flow_is_as_late_at_another_rate():

@@ -7,7 +7,6 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from tests.helpers.report_records import flight, navigated, replay
 
 from flownav.report import series
 from flownav.report.campaign_figures import Touchdowns
@@ -18,6 +17,7 @@ from flownav.report.landing import landing_picture
 from flownav.report.landing_scene import FRAMES
 from flownav.report.path_picture import path_picture
 from flownav.report.sureness import three_sigma
+from report_records import flight, navigated, replay
 
 SVG = "{http://www.w3.org/2000/svg}"
 JOKER = {"main_rotor.radius_m": {"value": 0.89}, "main_rotor.hub_above_cg_m": 0.25, "tail_rotor.behind_cg_m": 1.065,

@@ -6,8 +6,6 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from flownav.api.arguments import checked
 from flownav.api.calls import writing
 from flownav.api.record import Record
@@ -18,6 +16,7 @@ from flownav.campaigns.plan import Plan
 from flownav.campaigns.run import record_again
 from flownav.campaigns.store import RECORDS, REPORT, Dataset
 from flownav.core.errors import InputError
+from flownav.core.text import finite_or_none, interval_words
 from flownav.parts.flying import recording_of
 
 if TYPE_CHECKING:
@@ -75,8 +74,10 @@ class Campaign:
     def figure(self, name: str, cell: int = 0) -> dict[str, float | None]:
         """One figure of a cell: value, low and high (its 95 % interval). InputError names those that there are.
 
+        All three are None where there are fewer flights than `flights_needed`.
+
         Example:
-            >>> figure = flownav.campaign("landing", flights=16).figure("p95_axis_m")
+            >>> figure = flownav.campaign("landing", flights=20).figure("p95_axis_m")
             >>> figure["value"] > 0.0
             True
         """
@@ -186,7 +187,5 @@ def _number(figure: dict[str, float | None] | None) -> str:
     """A figure with its interval."""
     if figure is None or figure["value"] is None:
         return "-"
-    low, high = (
-        "?" if end is None or not np.isfinite(end) else f"{end:.3f}" for end in (figure["low"], figure["high"])
-    )
-    return f"{figure['value']:.3f} [{low}, {high}]"
+    low, high = map(finite_or_none, (figure["low"], figure["high"]))
+    return f"{figure['value']:.3f} [{interval_words(low, high, join=', ')}]"

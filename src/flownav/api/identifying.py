@@ -80,7 +80,7 @@ def identify_logs(
     from flownav.sensors.datasheet import load_sensor
 
     structures, base_sensor = parse_order(order), load_sensor(base)
-    with announce_compilation("identification"):
+    with announce_compilation("identification", "the identification, once, about 10 s"):
         findings = findings_of(logs, structures, heights_m, reference, flow_instance)
     if base is not None:
         findings = replace(findings, datasheet=base_sensor)

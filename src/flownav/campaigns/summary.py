@@ -97,16 +97,20 @@ def was_to_land(rows: Array) -> bool:
 
 
 def figures_of(rows: Array, plan: Plan) -> dict[str, dict[str, float | None]]:
-    """The figures of a cell's flights, each with its interval; the one that stopped it with that of the last look."""
+    """The figures of a cell's flights, each with its interval; the one that stopped it with that of the last look.
+
+    A figure of fewer flights than it needs would be the largest of them: it is null.
+    """
     stop = measures.stop_of(plan.until).figure if plan.until else None
     found = {}
     for name, figure in measures.FIGURES.items():
         if measures.MEASURES[figure.measure].of_landing and not was_to_land(rows):
             continue
         confidence = measures.confidence_of_a_look(plan.flights) if name == stop else measures.CONFIDENCE
-        found[name] = measures.figure_of(name, measures.values_of(name, rows), confidence).finite() | {
-            "confidence": confidence
-        }
+        needed = measures.flights_needed(name)
+        known = measures.figure_of(name, measures.values_of(name, rows), confidence).finite()
+        shown = known if len(rows) >= needed else dict.fromkeys(known)
+        found[name] = shown | {"confidence": confidence, "flights_needed": needed}
     return found
 
 

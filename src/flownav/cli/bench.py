@@ -10,6 +10,7 @@ from flownav.cli.options import named, option
 from flownav.cli.output import Column, answer, emit, progress, require_between, say, table_of
 
 WIDE = 144  # columns of the table
+COMPILED = "what is measured, once, about 2 minutes in all"
 COLUMNS = (
     Column("figure", "name"),
     Column("measured", lambda row: f"{row['value']:.3g} {row['unit']}"),
@@ -24,11 +25,12 @@ def command(
     as_json: options.Json = False,
 ) -> None:
     """Measure flights on both filters, lanes, the filters' steps, replay, start-up, compile time and memory."""
+    from flownav.core.compile import announce_compilation
     from flownav.studies.benchmark.measures import MEASUREMENTS, measure_all
 
     require_between("--flights", flights, 16, 1_000_000)
     figures = []
-    with progress("Measuring", MEASUREMENTS) as advance:
+    with announce_compilation("bench", COMPILED), progress("Measuring", MEASUREMENTS) as advance:
         for measured in measure_all(flights):
             figures += measured
             advance(1)

@@ -252,7 +252,7 @@ def _show_envelope(title: str, rows: list[dict[str, Any]], page: Path) -> None:
     for speed in sorted({row["speed_20ft_m_s"] for row in rows}):
         ring = {row["from_direction_deg"]: row["success"]["rate"] for row in rows if row["speed_20ft_m_s"] == speed}
         lines.append((f"{speed:g}", *(f"{100.0 * ring[direction]:.0f}" for direction in directions)))
-    heads = ("wind at 20 ft [m/s]", *(f"from {direction:g} deg [%]" for direction in directions))
-    wide = max(len(title) + 16, 26 + 19 * len(directions))
-    say(f"landed [%], {title}", table(heads, lines, left=1), wide=wide)
+    heads = ("m/s", *(f"{direction:g}°" for direction in directions))
+    said = "landed [%] by the wind at 20 ft (rows) and the direction that it blows from (columns)"
+    say(title, said, table(heads, lines, left=1), wide=max(len(said), 10 + 7 * len(directions)))
     typer.echo(f"page  {page}")

@@ -95,13 +95,10 @@ def show(summary: dict[str, Any], folder: Path, rate: float | None, records: lis
 
 
 def _of_figure(title: str, name: str) -> Column:
-    from flownav.campaigns.measures import flights_needed
-
-    needed = flights_needed(name)
-
     def cell(row: dict[str, Any]) -> str:
-        few = row["flights"] < needed and name in row["figures"]
-        return f"needs {needed} flights" if few else _interval(row["figures"].get(name))
+        found = row["figures"].get(name)
+        few = found is not None and row["flights"] < found["flights_needed"]
+        return f"needs {found['flights_needed']} flights" if few else _interval(found)
 
     return Column(title, cell)
 

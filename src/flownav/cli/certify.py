@@ -9,6 +9,7 @@ from flownav.cli import options
 from flownav.cli.options import argument, option, out_option, switch
 from flownav.cli.output import Column, answer, figure, progress, require_between, say, table_of
 from flownav.core.errors import InputError, VerdictError
+from flownav.core.text import key_words
 
 if TYPE_CHECKING:
     from flownav.campaigns.engines import Engine
@@ -180,6 +181,11 @@ def _say_plan(asked: Requirement, as_json: bool) -> None:
 
 
 INPUTS_RANKED = 5  # inputs that are printed
+KNOWN = {
+    "build": "all that is known once it is built",
+    "day": "all that is known on the day",
+    "never": "what nobody knows",
+}
 
 
 def show(facts: dict[str, Any]) -> None:
@@ -191,18 +197,22 @@ def show(facts: dict[str, Any]) -> None:
     if fields:
         counts = [(sum(field["verdict"] == name for field in fields), name) for name in ("pass", "not shown", "fail")]
         said = ", ".join(f"{count} {name}" for count, name in counts)
-        lines.append(f"envelope  {len(fields)} fields over {' and '.join(facts['envelope']['axes'])}: {said}")
+        lines.append(
+            f"envelope  {len(fields)} fields over {' and '.join(map(key_words, facts['envelope']['axes']))}: {said}"
+        )
     for cell in cells if len(cells) > 1 else ():
         lines.append(f"cell      {cell['cell']}: {cell['failures']} of {cell['flights']} failed, {cell['verdict']}")
     if facts["ranking"] and facts["ranking_of"] == "nothing":
         lines.append(f"rank      nothing: all {facts['ranking_flights']} flights of the ranking have the same outcome")
     elif facts["ranking"]:
-        lines += [f"rank      {_index(row, 'input')}" for row in facts["ranking"][:INPUTS_RANKED]]
-        lines += [f"known     {_index(row, 'known')}" for row in facts["split"]]
+        lines += _ranking(facts)
     again = facts["flown_again"]
-    lines.append(f"again     {again['sample']} flights drawn at random and {again['margin']} at the margin, the same")
+    lines.append(
+        f"again     {again['sample']} flights drawn at random and {again['margin']} at the margin, to the same bits"
+    )
     lines += [f"chosen    {name} {value}" for name, value in facts["chosen"].items() if value is not None]
-    say(*lines, f"page      {facts['out']}", wide=WIDE, soft=True)
+    say(*lines, wide=WIDE)
+    say(f"page      {facts['out']}", soft=True)
 
 
 def _allowed(one: dict[str, Any]) -> str:
@@ -214,14 +224,24 @@ def _unit(one: dict[str, Any]) -> str:
 
 
 WIDEST_INDEX = 0.5  # an index whose interval is wider shows nothing
+INDICES = ("first", "total")
 
 
-def _index(row: dict[str, Any], name: str) -> str:
-    """Both indices of an input; no figure of one that the rows of the ranking are too few for."""
-    said = []
-    for which in ("first", "total"):
-        low, high = row[f"{which}_interval"]
-        wide = high - low > WIDEST_INDEX
-        said.append(f"{which} unknown" if wide else f"{which} {row[which]:.2f} ({low:.2f} to {high:.2f})")
-    more = ": too few rows, give a larger --ranking" if all("unknown" in one for one in said) else ""
-    return f"{row[name]}: {', '.join(said)}{more}"
+def _ranking(facts: dict[str, Any]) -> list[str]:
+    """The first inputs of the ranking and the split, a line each; one line where its rows are too few for any index."""
+    rows = [("rank", key_words(row["input"]), row) for row in facts["ranking"][:INPUTS_RANKED]]
+    rows += [("known", KNOWN[row["known"]], row) for row in facts["split"]]
+    if not any(_is_known(row, which) for *_, row in rows for which in INDICES):
+        return ["rank      too few rows to rank any input; give a larger --ranking"]
+    return [f"{head:<10}{name}: {', '.join(_index(row, which) for which in INDICES)}" for head, name, row in rows]
+
+
+def _is_known(row: dict[str, Any], which: str) -> bool:
+    low, high = row[f"{which}_interval"]
+    return bool(high - low <= WIDEST_INDEX)
+
+
+def _index(row: dict[str, Any], which: str) -> str:
+    """An index of an input; no figure of one that the rows of the ranking are too few for."""
+    low, high = row[f"{which}_interval"]
+    return f"{which} {row[which]:.2f} ({low:.2f} to {high:.2f})" if _is_known(row, which) else f"{which} unknown"

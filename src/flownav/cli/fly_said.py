@@ -12,6 +12,7 @@ from flownav.scoring.headline import sentence
 WIDE = 80  # columns that one flight beside a published table takes
 WIDEST = 104  # columns that the medians and percentiles of many flights take, beside a published table
 STATISTICS, PRINTED = ("mean", "std", "rms", "max"), ("mean", "std")
+FLIGHTS_FOR_R95 = 20  # of fewer the radius would be that of the largest
 RANGED = ("rms", "max")  # of many flights with what 5 and 95 % of them are below
 MOTIONS = (
     ("sink_rate_m_s", "sinking at", "m/s"), ("lateral_speed_m_s", "drifting at", "m/s"), ("slide_m", "slid", "m"),
@@ -19,6 +20,7 @@ MOTIONS = (
 )  # fmt: skip
 UNITS = {"x": "m", "y": "m", "z": "m", "u": "m/s", "v": "m/s", "w": "m/s"}
 RECEIVERS = {"midg": "GPS of 2 m CEP", "white": "GPS with white noise"}
+HEADING = "heading  only the compass shows it in hover; GPS corrects it in fast flight"  # what limits it
 PARTS = {"estimate": "navigation", "guidance": "steering", "pad": "the pad's place"}  # of a touchdown's distance
 
 
@@ -41,13 +43,15 @@ def show(facts: dict[str, Any], manifest: Mapping[str, Any], median: int) -> Non
         cells = [_statistic(entry, name, digits) for name in STATISTICS]
         errors.add_row(f"{angle} [deg]", *cells, *("" for _ in PRINTED if paper))
     say(errors, wide=wide)
+    if facts["filter"] != "paper" and facts["attitude_deg"]:
+        say(HEADING)
     if paper:
         beside = "" if white else f"; {receiver(facts)} is not white"
         largest = _cell(facts["max_position_error_m"], digits)
         say(f"largest error of one position axis  {largest} m; paper: {paper['max_position_error_m']:.4f} m")
         say(f"the paper's are of its {paper['title']}: its own filter, with white GPS noise{beside}")
     if "known_exactly" in facts:
-        say(f"known without error  {facts['known_exactly']}")
+        say(f"known without error: {facts['known_exactly']}")
     if facts.get("takeoff"):
         say(*takeoff_lines(facts["takeoff"], facts["flights"]))
     if facts["touchdown"] is not None:
@@ -59,9 +63,8 @@ def show(facts: dict[str, Any], manifest: Mapping[str, Any], median: int) -> Non
     if "paper_percentile" in facts:
         say(_percentiles(facts["paper_percentile"]))
     which = f" (flight {median}, the one with the median largest error)" if many else ""
-    say(f"record  {facts['record']}{which}")
-    if "report" in facts:
-        say(f"report  {facts['report']}")
+    page = f"   report  {facts['report']}" if "report" in facts else ""
+    say(f"record  {facts['record']}{which}{page}", soft=True)
 
 
 def receiver(facts: Mapping[str, Any]) -> str:
@@ -94,7 +97,7 @@ def takeoff_lines(takeoff: dict[str, Any], flights: int) -> list[str]:
 
 def touchdown_lines(landing: dict[str, Any], landed: int | None, flights: int) -> list[str]:
     """The touchdown of one flight or of many, a sentence a line."""
-    said = _one_lines(landing) if landed is None else _many_lines(landing)
+    said = _one_lines(landing) if landed is None else _many_lines(landing, flights)
     return [*said, *([] if landed is None else _landed_lines(landing, landed, flights))]
 
 
@@ -111,7 +114,7 @@ def _one_lines(landing: dict[str, Any]) -> list[str]:
     return said
 
 
-def _many_lines(landing: dict[str, Any]) -> list[str]:
+def _many_lines(landing: dict[str, Any], flights: int) -> list[str]:
     """The touchdowns of many flights."""
     said = []
     for name, group in (("touchdown", landing["contact"]), ("at rest", landing["rest"])):
@@ -120,7 +123,9 @@ def _many_lines(landing: dict[str, Any]) -> list[str]:
         parts = [f"{_cell(group['distance_m'], 3)} m from the pad's centre, at {_cell(group['t_s'], 2)} s"]
         parts += [f"{words} {_cell(group[key], 3)} {unit}" for key, words, unit in MOTIONS if key in group]
         said.append(f"{name}  {', '.join(parts)}")
-        if group.get("r95_m") is not None:
+        if flights < FLIGHTS_FOR_R95:
+            said.append(f"95 % of the flights, {name}  needs {FLIGHTS_FOR_R95} flights")
+        elif group.get("r95_m") is not None:
             ends = interval_words(*group["r95_interval_m"])
             said.append(f"95 % of the flights, {name}  within {group['r95_m']:.3f} m (95 % interval {ends})")
     limited = landing["limited_by"]

@@ -233,7 +233,7 @@ LEAST_WORDS = 20  # columns that a column of words is not made narrower than
 
 def fitted(made: Table, console: Console) -> Iterator[Table]:
     """A table in the console's width: as it is where it fits, or with broken heads and words, or else its columns in
-    tables one under the other, each of which begins with the first column.
+    tables one under the other, each of which begins with the first column, or with all the first that are fixed.
     """
     from rich.measure import Measurement
 
@@ -245,12 +245,14 @@ def fitted(made: Table, console: Console) -> Iterator[Table]:
         part = _with_columns(made, chosen)
         return Measurement.get(console, console.options.update(max_width=10_000), part).minimum > console.width
 
-    chosen, title = [0], made.title
-    for k in range(1, len(made.columns)):
-        if len(chosen) > 1 and too_wide([*chosen, k]):
+    fixed = next((k for k, column in enumerate(made.columns) if not column.no_wrap), 0)
+    keys = list(range(max(fixed, 1)))
+    chosen, title = keys, made.title
+    for k in range(len(keys), len(made.columns)):
+        if len(chosen) > len(keys) and too_wide([*chosen, k]):
             yield _with_columns(made, chosen, title)
-            chosen, title = [0], None
-        chosen.append(k)
+            chosen, title = keys, None
+        chosen = [*chosen, k]
     yield _with_columns(made, chosen, title)
 
 

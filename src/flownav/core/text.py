@@ -27,6 +27,32 @@ def meant(word: str, known: Iterable[str]) -> str:
     return f"; did you mean {names[near[0]]}?" if near else ""
 
 
+UNITS = {
+    "rad_s": "rad/s", "m_s": "m/s", "deg_s": "°/s", "kg_m2": "kg m²", "kg_m3": "kg/m³", "n_m_rad": "N m/rad",
+    "n_m": "N/m", "n_s_m": "N s/m", "1_s": "1/s", "per_rad": "1/rad", "m2": "m²", "mrad": "mrad", "deg": "°",
+    "percent": "%", "mg": "mg", "ug_rthz": "µg/√Hz", "mgauss": "mG", "m": "m", "s": "s", "kg": "kg", "w": "W", "v": "V",
+    "ah": "Ah", "ohm": "Ω",
+}  # units at the end of a key, the longest that fits  # fmt: skip
+KEY_WORDS = {"wind.speed_20ft_m_s": "wind at 20 ft (m/s)", "wind.from_direction_deg": "wind from (°)"}
+
+
+def key_words(key: str) -> str:
+    """A key of a parameter file in words, with its unit.
+
+    Example:
+        >>> key_words("vehicle.main_rotor.speed_rad_s"), key_words("noise"), key_words("wind.from_direction_deg")
+        ('vehicle, main rotor: speed (rad/s)', 'noise', 'wind from (°)')
+    """
+    if key in KEY_WORDS:
+        return KEY_WORDS[key]
+    *groups, name = key.split(".")
+    ends = sorted((end for end in UNITS if name.endswith(f"_{end}")), key=len)
+    unit = f" ({UNITS[ends[-1]]})" if ends else ""
+    words = name.removesuffix(f"_{ends[-1]}") if ends else name
+    where = f"{', '.join(groups)}: " if groups else ""
+    return f"{where}{words}".replace("_", " ") + unit
+
+
 def finite_or_none(value: float | None) -> float | None:
     """A number as JSON has it: None where there is none, where it is infinite and where it is no number."""
     return None if value is None or not math.isfinite(value) else float(value)

@@ -37,6 +37,7 @@ from flownav.scoring.reference import Alignment, OutageError
 HORIZONTAL = (*GPS, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
 LONGEST_TABLE = 2000  # chosen: a replay each, hours of them
 FED_BEYOND = 2048  # readings at a time after the end of what is asked for, until an estimate lies beyond it
+COMPILED = "what a replay needs, once, about 20 s"  # as people are told while it is compiled
 LEAST_WINDOW_S = 1e-6  # what rounding leaves of a window is none
 
 
@@ -172,7 +173,7 @@ def replay(
         raise InputError(f"{log.path}: {arg('smooth')} takes a log; a live session's record is replayed as it was fed")
     if smoothed and instead is not None:
         raise InputError(f"{log.path}: {arg('smooth')} smooths our own filter's path; leave it out with another filter")
-    with announce_compilation("replay"):
+    with announce_compilation("replay", COMPILED):
         prepared = prepared_as_fed(log) if log.fed else prepare(log, options)
         return _run(log, options, settings, prepared, smoothed=smoothed, instead=instead)
 
@@ -205,7 +206,7 @@ def outage_table(
         return _run(log, cut, settings, prepared, until_s=window[1]).outage(*window)
 
     errors = []
-    with announce_compilation("replay"), ThreadPoolExecutor(2) as pool:
+    with announce_compilation("replay", COMPILED), ThreadPoolExecutor(2) as pool:
         prepared = prepared_as_fed(log) if log.fed else prepare(log, replace(options, gps_outages_s=()))
         for error in pool.map(error_of, windows):
             errors.append(error)

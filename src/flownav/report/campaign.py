@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from flownav.core import guard
-from flownav.core.text import interval_words
+from flownav.core.text import interval_words, key_words
 from flownav.core.version import __version__
 from flownav.report import campaign_figures as figures
 from flownav.report import certificate_figures, tables
@@ -92,13 +92,22 @@ def sentence(cell: dict[str, Any]) -> str:
     figure = cell["figures"].get("r95_m")
     if figure is None:
         axis = cell["figures"]["p95_axis_m"]
+        if _is_few(axis, cell):
+            return f"{cell['flights']} flights; the error that 95 % stay within needs {axis['flights_needed']}."
         return f"In 95 % of {cell['flights']} flights no axis was more than {_with_interval(axis)} m off."
     landed = cell["figures"]["landed"]
     share = f"{100 * landed['value']:.2f} % ({100 * landed['low']:.2f} to {100 * landed['high']:.2f} %)"
-    return (
-        f"Of {cell['flights']} flights of {cell['label']} {share} landed; 95 % of all first touched within "
-        f"{_with_interval(figure)} m of the pad's centre. In brackets: 95 % confidence intervals."
-    )
+    how = f"Of {cell['flights']} flights of {cell['label']} {share} landed"
+    if _is_few(figure, cell):
+        return f"{how}; the radius that 95 % touch within needs {figure['flights_needed']} flights."
+    if figure["value"] is None:
+        return f"{how}; fewer than 95 % touched without a crash, so that no radius about the pad's centre holds 95 %."
+    within = f"95 % of all first touched within {_with_interval(figure)} m of the pad's centre"
+    return f"{how}; {within}. In brackets: 95 % confidence intervals."
+
+
+def _is_few(figure: Mapping[str, Any], cell: Mapping[str, Any]) -> bool:
+    return bool(cell["flights"] < figure.get("flights_needed", 1))
 
 
 def headings(summary: dict[str, Any]) -> list[str]:
@@ -118,7 +127,7 @@ def cell_row(cell: dict[str, Any], summary: dict[str, Any]) -> list[str]:
     landed = cell["figures"].get("landed")
     share = "-" if "r95_m" not in cell["figures"] or landed is None else _percent(landed)
     counts = cell["verdicts"]
-    shown = [_with_interval(cell["figures"][name]) if name in cell["figures"] else "-" for name in names]
+    shown = [_of_cell(cell["figures"].get(name), cell) for name in names]
     return [cell["label"], f"{cell['flights']:,}", *shown, share, str(counts["crashed"]), str(counts["went_around"])]
 
 
@@ -144,6 +153,12 @@ def limits(summary: dict[str, Any]) -> list[tuple[str, list[tuple[str, str]]]]:
         )
         for cell in summary["cells"][:MOST_CELLS]
     ]
+
+
+def _of_cell(figure: dict[str, Any] | None, cell: Mapping[str, Any]) -> str:
+    if figure is None:
+        return "-"
+    return f"needs {figure['flights_needed']} flights" if _is_few(figure, cell) else _with_interval(figure)
 
 
 def _with_interval(figure: dict[str, float | None]) -> str:
@@ -182,7 +197,7 @@ def render_certificate(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> st
         chosen=chosen(facts),
         conditions=conditions(facts),
         worst=[worst_of(facts, told) for told in facts["worst"]],
-        axes=[certificate_figures.INPUT_WORDS.get(name, name) for name in facts["envelope"]["axes"]],
+        axes=[key_words(name) for name in facts["envelope"]["axes"]],
         known=certificate_figures.KNOWN_WORDS,
         groups=tables.groups,
         files=[
@@ -248,7 +263,7 @@ def conditions(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
         low, high = entry.get("loc", 0.0), entry.get("loc", 0.0) + entry.get("scale", 1.0)
         even = entry["distribution"] == "uniform"
         said = f"{low:.15g} to {high:.15g}, evenly" if even else tables.text(entry)
-        rows.append((certificate_figures.INPUT_WORDS.get(name, name), said))
+        rows.append((key_words(name), said))
     for name, value in given.items():
         if value == []:
             continue

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flownav.core.measurement import Array
+from flownav.core.text import key_words
 from flownav.report.chart import drawn
 from flownav.report.panels import Panel
 from flownav.report.style import COLOUR, FONT, Drawing, axis, drawing, layout
@@ -32,8 +33,14 @@ class Touchdowns(NamedTuple):
 
 
 def common_reach_m(cells: Sequence[dict[str, Any]], touched: Sequence[Touchdowns]) -> float:
-    """How far from the pad's centre the maps of all cells reach, so that they can be compared [m]: a pad at most."""
+    """How far from the pad's centre the maps of all cells reach, so that they can be compared [m]: a pad at most.
+
+    Of a cell of which no radius is known it is as far as its flights touched.
+    """
     radii = [cell["figures"][name]["value"] or 0.0 for cell in cells for name, _, _ in CIRCLES]
+    for cell, one in zip(cells, touched, strict=True):
+        if cell["figures"]["r95_m"]["value"] is None:
+            radii += one.distance_m[np.isfinite(one.distance_m)].tolist()
     return 1.15 * min(max([0.05, *radii]), max((one.pad_m for one in touched), default=1.0))
 
 
@@ -82,7 +89,8 @@ def tails(cells: Sequence[dict[str, Any]], touched: Sequence[Touchdowns]) -> Pan
         if len(kept):
             farthest = max(farthest, float(far[kept].max()))
             line = {"color": COLOUR[ROLES[number % len(ROLES)]], "width": 1.6, "shape": "hv"}
-            data.append({"type": "scatter", "mode": "lines", "name": cell["label"], "x": drawn(far[kept]),
+            mode = "lines" if len(kept) > 2 else "lines+markers"
+            data.append({"type": "scatter", "mode": mode, "name": cell["label"], "x": drawn(far[kept]),
                          "y": drawn(100.0 * beyond[kept]), "line": line, "hovertemplate": "%{y:.3g} %"})  # fmt: skip
     look = layout(360)
     look["xaxis"] = axis("distance from the pad's centre (m)")
@@ -174,7 +182,7 @@ def envelope(key: str, cell: dict[str, Any]) -> Panel | None:
                           "colorbar": {"title": {"text": "landed"}, "tickformat": ".0%", "thickness": 12}},
             "polar": {"bgcolor": "rgba(0,0,0,0)",
                       "angularaxis": {"rotation": 90, "direction": "clockwise", "ticksuffix": "°", **quiet},
-                      "radialaxis": {"ticksuffix": " m/s", "angle": 90, **quiet}},
+                      "radialaxis": {"ticksuffix": " m/s", "angle": 90, "nticks": 4, **quiet}},
         }
     )  # fmt: skip
     words = "Share that landed, by the wind at 20 ft and where it blew from (north is up)."
@@ -189,7 +197,8 @@ def sensitivity(key: str, cell: dict[str, Any]) -> Panel | None:
     values = [one["rank_correlation"] for one in told]
     sure = [one["low"] > 0.0 or one["high"] < 0.0 for one in told]
     bars = {
-        "type": "bar", "orientation": "h", "x": values, "y": [one["input"] for one in told], "showlegend": False,
+        "type": "bar", "orientation": "h", "x": values, "showlegend": False,
+        "y": [key_words(one["input"]) for one in told],
         "marker": {"color": [COLOUR["estimate"] if each else COLOUR["pad"] for each in sure]},
         "error_x": {"type": "data", "symmetric": False, "color": COLOUR["muted"], "thickness": 1, "width": 3,
                     "array": [one["high"] - one["rank_correlation"] for one in told],
@@ -233,9 +242,10 @@ def over_a_sweep(cells: Sequence[dict[str, Any]], name: str) -> Panel:
                      "error_y": {"type": "data", "symmetric": False, "color": colour, "thickness": 1, **ends},
                      })  # fmt: skip
     look = layout(360)
-    look["xaxis"], look["yaxis"] = axis(name), axis(words)
+    look["xaxis"], look["yaxis"] = axis(key_words(name)), axis(words)
     key = f"sweep-{name.replace('.', '-')}"
-    return Panel(key, name, "Bars: 95 % intervals.", f"{words} over {name}", drawing(data, look), wide=True)
+    over = key_words(name)
+    return Panel(key, over, "Bars: 95 % intervals.", f"{words} over {over}", drawing(data, look), wide=True)
 
 
 def _ring(

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.measurement import Array
+from flownav.core.text import key_words
 from flownav.report.campaign_figures import DIRECTION, SPEED
 from flownav.report.chart import drawn
 from flownav.report.panels import Panel
 from flownav.report.style import COLOUR, Drawing, axis, drawing, layout
 
-INPUT_WORDS = {SPEED: "wind at 20 ft (m/s)", DIRECTION: "wind from (°)"}
 KNOWN_WORDS = {
     "build": "known once built",
     "day": "known on the day",
@@ -158,9 +158,9 @@ def envelope(facts: Mapping[str, Any]) -> Panel:
                            "linecolor": COLOUR["ink"], "nticks": 5, "tickfont": {"color": COLOUR["ink"], "size": 11}},
         }  # fmt: skip
     elif len(axes) == 2:
-        look |= {"xaxis": axis(INPUT_WORDS.get(axes[0], axes[0])), "yaxis": axis(INPUT_WORDS.get(axes[1], axes[1]))}
+        look |= {"xaxis": axis(key_words(axes[0])), "yaxis": axis(key_words(axes[1]))}
     else:
-        look |= {"xaxis": axis(INPUT_WORDS.get(axes[0], axes[0])),
+        look |= {"xaxis": axis(key_words(axes[0])),
                  "yaxis": axis("share of flights that meet it") | {"tickformat": ".1%"}}  # fmt: skip
     look |= {"barmode": "overlay", "hovermode": "closest"}
     smallest = min(field["flights"] for field in fields)
@@ -171,7 +171,7 @@ def envelope(facts: Mapping[str, Any]) -> Panel:
     if smallest < need:
         caption += f" A field alone needs {need} flights to pass; the emptiest has {smallest}."
     caption += " Direction is where the wind blows from." if polar else ""
-    alt = f"Verdicts of {len(fields)} fields over {' and '.join(axes)}."
+    alt = f"Verdicts of {len(fields)} fields over {' and '.join(map(key_words, axes))}."
     return Panel(key, title, caption, alt, drawing(data, look), wide=True)
 
 
@@ -201,7 +201,7 @@ def _fields(
 
 
 def _field_words(axes: Sequence[str], field: Mapping[str, Any]) -> str:
-    where = [f"{INPUT_WORDS.get(name, name)}: {field[name][0]:.3g} to {field[name][1]:.3g}" for name in axes]
+    where = [f"{key_words(name)}: {field[name][0]:.3g} to {field[name][1]:.3g}" for name in axes]
     return "<br>".join([
         *where,
         f"{field['failures']} of {field['flights']} flights fail: {field['verdict']}",
@@ -243,9 +243,10 @@ def ranking(facts: Mapping[str, Any]) -> list[Panel]:
 
 
 def _broken(name: str) -> str:
-    """A long dotted name on two lines."""
-    front, dot, last = name.rpartition(".")
-    return f"{front}.<br>{last}" if dot and len(name) > 22 else name
+    """A key in words, a long one on two lines."""
+    words = key_words(name)
+    front, colon, last = words.partition(": ")
+    return f"{front}:<br>{last}" if colon and len(words) > 22 else words
 
 
 def _bars(rows: Sequence[Mapping[str, Any]], height_px: int) -> Drawing:

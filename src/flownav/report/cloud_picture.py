@@ -26,13 +26,15 @@ def cloud_picture(cell: dict[str, Any], touched: Touchdowns) -> Picture | None:
     shown = places[:: int(np.ceil(len(places) / DOTS))]
     wide_m = max(0.5 * touched.pad_m, 1.05 * max((size for *_, size in rings), default=0.1))
     near_m = BEYOND * max((size for *_, size in rings), default=float(np.abs(places).max()) + 0.01)
-    pad = f"The pad of {touched.pad_m:g} m, and where {len(places)} flights first touched"
+    flights = f"{len(places)} flight{'s' * (len(places) > 1)}"
+    pad = f"The pad of {touched.pad_m:g} m, and where {flights} first touched"
     views = [
         (view(0, VIEW_PX, pad, _above(shown, rings, touched.pad_m, wide_m, named=False)), VIEW_PX),
         (view(1, VIEW_PX, "Close up", _above(shown, rings, touched.pad_m, near_m, named=True)), VIEW_PX),
     ]
     told = ", ".join(f"{title} {metres(size)} m" for title, _, size in rings)
-    words = f"Where the flights of {cell['label']} first touched, north up; rings about the pad's centre: {told}."
+    drawn = f"rings about the pad's centre: {told}" if rings else "too few touched for a ring that holds half of all"
+    words = f"Where the flights of {cell['label']} first touched, north up; {drawn}."
     return Picture(side_by_side(views, words), words)
 
 

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from flownav.core.measurement import Sensor
-from flownav.core.record import Record, mapping
+from flownav.core.record import POSITION_NED, Record, mapping
 from flownav.report import series
 from flownav.report.panels import NONE, Part, Tile, metres, number
 from flownav.report.series import has, readings
 from flownav.scoring.headline import sentence
 
 UNIT_AFTER_NUMBER = re.compile(r"(\d) (m/s|m|s)\b")
+SETTLES_S = 1.0  # after the first range, until the height follows it
 AXES = {"x": "north", "y": "east", "z": "height"}
 KINDS = {
     "fly": "A closed-loop simulated flight of {}.",
@@ -25,8 +26,11 @@ KINDS = {
 
 
 def title(record: Record) -> str:
-    """The heading of a report: the scenario's (or the log's) name."""
-    name = record.manifest.get("scenario") or record.manifest.get("log") or record.manifest.get("kind") or "Flight"
+    """The heading of a report: the scenario's name in words, or the log's as its file is called."""
+    scenario, log = record.manifest.get("scenario"), record.manifest.get("log")
+    if log and not scenario:
+        return PurePath(str(log)).name or "Flight"
+    name = scenario or record.manifest.get("kind") or "Flight"
     words = PurePath(str(name)).name.removesuffix(".toml").replace("_", " ").replace("-", " ").strip() or "Flight"
     return words[0].upper() + words[1:]
 
@@ -99,12 +103,21 @@ def tiles(record: Record) -> list[Tile]:
         against = (
             "of the autopilot's input" if has(record, "flown") else f"estimate against {series.truth_name(record)}"
         )
-        note = f"paper {metres(published)} m" if published is not None else f"{against}{_axis_of_largest(scores)}"
+        note = (
+            f"paper {metres(published)} m" if published is not None else f"{against}{_axis_of_largest(scores, record)}"
+        )
         found.append(Tile("Largest error of one axis", metres(scores["max_position_error_m"]), "m", note))
     turned: list[Any] = [mapping(error).get("rms_error") for error in mapping(scores.get("attitude_deg")).values()]
     if len(turned) == 3 and all(isinstance(angle, float) for angle in turned):
         tilt, heading = math.hypot(*turned[:2]), number(turned[2], 2)
-        found.append(Tile("Attitude error", number(tilt, 2), "°", f"rms of roll and pitch; heading {heading}°"))
+        found.append(
+            Tile(
+                "Attitude error",
+                number(tilt, 2),
+                "°",
+                f"rms of roll and pitch; heading {heading}°{_heading_limit(record)}",
+            )
+        )
     cut = series.scored_outages(record)
     if cut:
         worst = max(cut, key=series.rms_m)
@@ -128,12 +141,37 @@ def tiles(record: Record) -> list[Tile]:
     return [*found, Tile(name, f"{100 * share:.0f}", "%", "of the time")]
 
 
-def _axis_of_largest(scores: Mapping[str, Any]) -> str:
-    """Which axis of the position erred most, as words to follow; "" where the scores lack it."""
+def _heading_limit(record: Record) -> str:
+    """What limits the heading of the navigator in simulation, as words to follow."""
+    ours = record.manifest.get("kind") == "fly" and record.manifest.get("filter") == "landing"
+    return ", which only the compass shows in hover" if ours else ""
+
+
+def _axis_of_largest(scores: Mapping[str, Any], record: Record) -> str:
+    """Which axis of the position erred most, as words to follow; "" where the scores lack it.
+
+    Of a height it is added if the error was so large only before the first range was received.
+    """
     states = mapping(scores.get("states"))
     errors = {words: mapping(states.get(key)).get("max_error") for key, words in AXES.items()}
     known = {words: float(value) for words, value in errors.items() if isinstance(value, int | float)}
-    return f": {max(known, key=lambda words: known[words])}" if len(known) == len(AXES) else ""
+    if len(known) != len(AXES):
+        return ""
+    worst = max(known, key=lambda words: known[words])
+    before = worst == AXES["z"] and _is_before_the_first_range(record, known[worst])
+    return f": {worst}{', before the first range' if before else ''}"
+
+
+def _is_before_the_first_range(record: Record, largest_m: float) -> bool:
+    """Whether the height's error is smaller than its largest by half from the first range on that was fused."""
+    ranged_s = series.first_fused_s(record, Sensor.RANGE)
+    flown = series.track(record, "flown" if has(record, "flown") else "estimate", POSITION_NED)
+    truth = series.track(record, "truth", POSITION_NED)
+    if ranged_s is None or flown is None or truth is None:
+        return False
+    error = series.difference(flown, truth)
+    after = np.abs(error.value[error.t_s > ranged_s + SETTLES_S, 2])
+    return bool(len(after) and np.nanmax(after) < 0.5 * largest_m)
 
 
 def flow_share(record: Record) -> float | None:

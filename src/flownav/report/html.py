@@ -29,7 +29,7 @@ from flownav.report.landing import landing_picture
 from flownav.report.page_data import Columns, paths_data, sections_data
 from flownav.report.panels import Panel, Section
 from flownav.report.path_picture import path_picture
-from flownav.report.series import Window, first_pad_fix_s, has, moments, outages, start_end_s
+from flownav.report.series import Window, first_pad_fix_s, has, is_north_known, moments, outages, start_end_s
 from flownav.report.spectrum import spectrum
 from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE, Drawing
 from flownav.scoring.phases import Phase, phases_of
@@ -185,6 +185,7 @@ def flight_facts(record: Record, found: Sequence[Phase]) -> dict[str, Any]:
         "t1": t1,
         "step": 0.1 if t1 - t0 > 20.0 else 0.02,
         "start": min(max(touch, t0), t1),
+        "north": is_north_known(record),
         "phases": [p._replace(t0=max(t0, p.t0), t1=min(t1, p.t1))._asdict() for p in found if p.t1 > t0 and p.t0 < t1],
         "moments": [*found_pad, *({"t": moment.t_s, "name": moment.name} for moment in marked)],
         "outages": [list(window) for window in outages(record)],

@@ -12,7 +12,7 @@ from flownav.core.measurement import Array
 from flownav.core.record import Record
 from flownav.report.figures_states import Paths, paths_of
 from flownav.report.landing import HIGH_PX, ROUND_M, Picture, animated, polyline, scale_bar, side_by_side, view
-from flownav.report.series import Track, Window, at, start_end_s
+from flownav.report.series import Track, Window, at, is_north_known, start_end_s
 from flownav.scoring.phases import Phase, phases_of
 
 MAP_PX, HEIGHT_PX = 440, 520
@@ -37,7 +37,11 @@ def path_picture(record: Record) -> Picture | None:
     if main is None:
         return None
     words = _words(shown, paths, window)
-    views = [(_map(shown, main, paths, window), MAP_PX), (_height(shown, main, phases_of(record), window), HEIGHT_PX)]
+    north = is_north_known(record)
+    views = [
+        (_map(shown, main, paths, north=north), MAP_PX),
+        (_height(shown, main, phases_of(record), window), HEIGHT_PX),
+    ]
     return Picture(side_by_side(views, words), words)
 
 
@@ -53,8 +57,8 @@ def _main(shown: list[tuple[str, str, Track]]) -> Track | None:
     return order[0] if order else None
 
 
-def _map(shown: list[tuple[str, str, Track]], main: Track, paths: Paths, window: Window) -> str:
-    """From above, north up the page; where GPS was cut, a broad line lies under the path."""
+def _map(shown: list[tuple[str, str, Track]], main: Track, paths: Paths, *, north: bool) -> str:
+    """From above, north up the page where it is known; where GPS was cut, a broad line lies under the path."""
     places = np.vstack([path.value[:, :2] for _, _, path in shown])
     low, high = places.min(axis=0), places.max(axis=0)
     scale = float(min(HIGH_PX - 80.0, MAP_PX - 2 * MARGIN_PX) / max(*(high - low), LEAST_M))
@@ -73,10 +77,10 @@ def _map(shown: list[tuple[str, str, Track]], main: Track, paths: Paths, window:
         f'<text class="key {role}" x="{MAP_PX - 4}" y="{38 + 15 * k}">{escape(name)}</text>'
         for k, (role, name) in enumerate(rows)
     )
-    north = '<path class="arrow" d="M14 62V38m-4 7 4-7 4 7"/><text x="14" y="76" text-anchor="middle">N</text>'
+    arrow = '<path class="arrow" d="M14 62V38m-4 7 4-7 4 7"/><text x="14" y="76" text-anchor="middle">N</text>'
     dot = _dot(placed(at(np.linspace(*_ends(main), FRAMES), main)))
     bar = scale_bar(scale, (*ROUND_M, *FAR_M))
-    return view(0, MAP_PX, "The path from above", f"{cut}{drawn}{dot}{key}{north}{bar}")
+    return view(0, MAP_PX, "The path from above", f"{cut}{drawn}{dot}{key}{arrow if north else ''}{bar}")
 
 
 def _height(shown: list[tuple[str, str, Track]], main: Track, phases: list[Phase], window: Window) -> str:

@@ -179,6 +179,7 @@ const panels = (() => {
       ctx.beginPath();
       ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
       ctx.clip();
+      const ends = []; // of the words so far, a line each: those that would lie over others go on the next
       for (const moment of flight.facts.moments) {
         if (moment.t < from || moment.t > to) continue;
         const x = Math.round(u.valToPos(moment.t, "x", true));
@@ -189,7 +190,13 @@ const panels = (() => {
         ctx.moveTo(x, bbox.top);
         ctx.lineTo(x, bbox.top + bbox.height);
         ctx.stroke();
-        if (!k) this.word(ctx, moment.name, x + 3 * dpr, bbox.top + 11 * dpr, bbox.left + bbox.width - x, "muted", dpr);
+        if (k) continue;
+        ctx.font = FONT(10.5 * dpr);
+        const wide = ctx.measureText(moment.name).width + 9 * dpr;
+        let line = ends.findIndex((end) => end <= x);
+        if (line < 0) line = ends.length;
+        ends[line] = x + wide;
+        this.word(ctx, moment.name, x + 3 * dpr, bbox.top + (11 + 12 * line) * dpr, bbox.left + bbox.width - x, "muted", dpr);
       }
       ctx.setLineDash([]);
       for (const one of row.series) {

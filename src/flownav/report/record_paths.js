@@ -68,7 +68,7 @@ const paths = (() => {
       }
       const north = this.project([edges[0][1], edges[1][1], this.floor]);
       const south = this.project([edges[0][1], edges[1][1] - step, this.floor]);
-      this.arrow(south, north, "N");
+      if (flight.facts.north) this.arrow(south, north, "N");
       const note = this.lift === 1 ? "" : `, heights \u00d7${+this.lift.toPrecision(2)}`;
       this.text(`grid ${metres(step)}${note}`, this.width - 10, this.height - 8, "muted", "right");
       this.pad();
@@ -159,7 +159,7 @@ const paths = (() => {
       ctx.fillRect(left, y - 4, 1.5, 6);
       ctx.fillRect(left + long * this.zoom - 1.5, y - 4, 1.5, 6);
       this.text(metres(long), left + 0.5 * long * this.zoom, y - 6, "ink", "center");
-      Space.prototype.arrow.call(this, [this.width - 22, 66], [this.width - 22, 40], "N");
+      if (flight.facts.north) Space.prototype.arrow.call(this, [this.width - 22, 66], [this.width - 22, 40], "N");
       this.mark(this.place(this.main, flight.t));
     }
 

@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flownav.core.measurement import COLUMNS, Array, Sensor
 from flownav.core.record import QUATERNION, Record, mapping
@@ -158,13 +159,35 @@ def euler_deg(attitude: Track) -> Array:
 
 def first_pad_fix_s(record: Record) -> float | None:
     """When the pad's camera first gave a fix that was fused [s]; None where it never did."""
+    return first_fused_s(record, Sensor.PAD)
+
+
+def first_fused_s(record: Record, sensor: Sensor) -> float | None:
+    """When the first reading of a sensor was fused [s]; None where none was."""
     table = record.tables.get("innovation", {})
     if "sensor" not in table or "fused" not in table:
         return None
-    named = [str(value).lower() in ("pad", str(int(Sensor.PAD))) for value in np.unique(table["sensor"])]
-    pads = np.unique(table["sensor"])[named]
-    fused = np.isin(table["sensor"], pads) & (np.asarray(table["fused"], float) > 0.5)
+    fused = _of(table["sensor"], sensor) & (np.asarray(table["fused"], float) > 0.5)
     return float(np.min(np.asarray(table["t_s"], float)[fused])) if fused.any() else None
+
+
+def _of(named: Any, sensor: Sensor) -> NDArray[np.bool_]:
+    """Which rows of a table are of a sensor, by its name or its number."""
+    every = np.unique(named)
+    return np.isin(named, every[[str(one).lower() in (sensor.name.lower(), str(int(sensor))) for one in every]])
+
+
+TELLS_NORTH = (
+    Sensor.GPS_POSITION, Sensor.GPS_VELOCITY, Sensor.ATTITUDE, Sensor.MAG, Sensor.POSE, Sensor.YAW,
+)  # fmt: skip
+
+
+def is_north_known(record: Record) -> bool:
+    """Whether north on a picture is north on earth: of a simulated flight, or of a log with a sensor that tells it."""
+    table = record.tables.get("innovation", {})
+    if record.manifest.get("kind") == "fly" or "sensor" not in table:
+        return True
+    return any(bool(_of(table["sensor"], sensor).any()) for sensor in TELLS_NORTH)
 
 
 def moments(record: Record) -> list[Moment]:

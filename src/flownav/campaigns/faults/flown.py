@@ -26,7 +26,7 @@ from flownav.scoring.landings import REST_DISTANCE, column_of, verdict_of
 from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.engine import Flown, fly_written
 from flownav.simulation.history import column, columns
-from flownav.simulation.scenario import Scenario
+from flownav.simulation.scenario import Scenario, load_scenario
 from flownav.simulation.sensing import EPOCH_S
 from flownav.simulation.truth import SOUND, SensorFault
 
@@ -53,6 +53,10 @@ AUTOPILOT = {
 }  # fmt: skip
 
 
+WITH_CAMERA = "none, pad camera"  # the row without a fault in which a pad camera leads the landing
+CAMERA_OF = "approach"  # the scenario whose pad camera, and autopilot for it, that row has
+
+
 class FlightScores(NamedTuple):
     """One flight: time of the first refusals and of the first warning [s after the fault began], the largest horizontal
     error of the estimate used by the autopilot, ever and before any warning [m], the outcome, and the distance from the
@@ -68,7 +72,7 @@ class FlightScores(NamedTuple):
 
 
 class Row(NamedTuple):
-    """A fault at a height, over its flights; fault NO_FAULT: the same flights without."""
+    """A fault at a height, over its flights; NO_FAULT: the same flights without, WITH_CAMERA: and with a camera."""
 
     fault: str
     height_m: float
@@ -104,14 +108,17 @@ def flown_table(
     matched: bool = False,
     on_progress: Callable[[int], None] = lambda done: None,
 ) -> list[Row]:
-    """Fly every fault at every height for every duration: rows by height, without a fault first.
+    """Fly every fault at every height for every duration: rows by height, without a fault first, with a camera before.
 
     matched: vehicle and sensors as in their datasheets; else each flight has a truth of its own.
     """
     rows = []
     for height_m in heights_m:
-        setup = assemble(scenario_flown(height_m, vehicle))
-        begins_s = window_start(height_m)
+        setup, begins_s = assemble(scenario_flown(height_m, vehicle)), window_start(height_m)
+        seen = assemble(with_camera(scenario_flown(height_m, vehicle)))
+        led = tuple(_fly(seen, None, (begins_s, begins_s), flights, seed, matched))
+        rows.append(Row(WITH_CAMERA, height_m, 0.0, led))
+        on_progress(1)
         tried: list[tuple[Fault | None, float]] = [(None, 0.0)]
         tried += [(fault, duration) for fault in faults for duration in durations_of(fault, durations_s)]
         for fault, duration_s in tried:
@@ -128,6 +135,13 @@ def scenario_flown(height_m: float, vehicle: str | None = None) -> Scenario:
     """
     words = f"faults_{height_m:g}_m", "landing on the same pad, go-arounds"
     return hovering(words, height_m, window_start(height_m) + DESCENDS_AFTER_S, AUTOPILOT, vehicle, AROUND_S)
+
+
+def with_camera(scenario: Scenario) -> Scenario:
+    """The scenario with the pad camera of CAMERA_OF, and landed as its autopilot lands."""
+    of = load_scenario(CAMERA_OF)
+    autopilot = of.autopilot.model_copy(update={"home": scenario.autopilot.home})
+    return scenario.model_copy(update={"pad_fix": of.pad_fix, "autopilot": autopilot})
 
 
 def _fly(

@@ -80,7 +80,7 @@ def navigator_told(told: Told) -> Navigate:
     def navigate(streams: Mapping[Sensor, Stream]) -> Navigated:
         """Raises InputError where the filter never starts."""
         prepared, queue, running = started(streams, told)
-        with announce_compilation("faults"):
+        with announce_compilation("faults", "the navigator, once, about 20 s"):
             run(queue, running)
         written = written_on(running.tape)
         if len(written.estimate) < 2:

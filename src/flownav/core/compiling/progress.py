@@ -22,18 +22,20 @@ class Progress:
         self._done = 0
         self._expected = 0
         self._whole = ""
+        self._announced = False  # whether the line with the whole was written where lines cannot be written over
         self._stop = threading.Event()
         self._ticking: threading.Thread | None = None
 
     @contextmanager
-    def announce(self, what: str, *, throughout: bool = False) -> Iterator[None]:
+    def announce(self, what: str, whole: str = "", *, throughout: bool = False) -> Iterator[None]:
         """Report compilation inside the block; write nothing where all is in the cache.
 
+        whole: what it is for and how long it takes, in words for people, in place of the names of its parts.
         throughout: a whole run, in which blocks within have their own names and sums.
         """
         with self._lock:
             if self._listeners == self._throughout:
-                self._begin(what)
+                self._begin(what, whole)
             self._listeners += 1
             self._throughout += throughout
         try:
@@ -46,17 +48,20 @@ class Progress:
                     self._finish()
                     self._begin("flownav")
 
-    def _begin(self, what: str) -> None:
+    def _begin(self, what: str, whole: str = "") -> None:
         self._what, self._start, self._done, self._expected = what, 0.0, 0, 0
+        self._whole, self._announced = whole, False
 
     @contextmanager
     def expect(self, parts: int, whole: str = "") -> Iterator[None]:
         """Report each of `parts` parts by name. whole: their common name, written in place of theirs."""
-        before, self._expected, self._whole = self._expected, self._done + parts, whole
+        before, around = self._expected, self._whole
+        self._expected, self._whole = self._done + parts, around or whole
+        self._announced = self._announced and bool(around)
         try:
             yield
         finally:
-            self._expected, self._whole = before, ""
+            self._expected, self._whole = before, around
 
     @contextmanager
     def working(self, name: str) -> Iterator[None]:
@@ -78,7 +83,8 @@ class Progress:
             self._start = self._start or time.monotonic()
             if self._on_terminal():
                 self._tick()
-            elif len(self._working) == 1 or (self._expected and not self._whole):
+            elif not self._announced if self._whole else len(self._working) == 1 or self._expected:
+                self._announced = bool(self._whole)
                 self._write(f"flownav: {self._line()} ...\n")
 
     def end(self, name: str, done: bool = True) -> None:

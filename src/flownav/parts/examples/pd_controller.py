@@ -6,11 +6,9 @@ It hovers and follows a path in calm air; with a steady wind it stands off, as a
 import numpy as np
 
 from flownav.control.gains import AutopilotGains
-from flownav.control.guidance import Reference
 from flownav.core.measurement import Array
-from flownav.parts.protocols import Flown
+from flownav.parts import Controls, Flown, Reference
 from flownav.parts.tools import matrix
-from flownav.vehicle.state import Controls
 
 GRAVITY_M_S2 = 9.80665
 

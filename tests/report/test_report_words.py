@@ -1,0 +1,77 @@
+"""What a report calls things: a log by its file's name, north only where it is known, an error by its cause."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from flownav.core.measurement import Sensor
+from flownav.core.record import Record
+from flownav.report.content import tiles, title
+from flownav.report.html import flight_facts
+from flownav.report.path_picture import path_picture
+from flownav.report.series import first_fused_s, is_north_known
+from report_records import replay
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.mark.parametrize(
+    ("manifest", "said"),
+    [
+        ({"kind": "replay", "log": "/data/My_flight-03.ulg"}, "My_flight-03.ulg"),
+        ({"kind": "fly", "scenario": "pad_return"}, "Pad return"),
+        ({"kind": "live"}, "Live"),
+        ({}, "Flight"),
+    ],
+)
+def test_a_log_is_called_as_its_file_and_a_scenario_in_words(manifest, said):
+    assert title(Record(manifest)) == said
+
+
+def fused(*sensors):
+    count = len(sensors)
+    return {"t_s": np.arange(1.0, 1.0 + count), "sensor": np.array(sensors), "fused": np.ones(count, bool)}
+
+
+def has_arrow(record):
+    """Whether the map has the N of its north arrow."""
+    path, _ = (view.find(f"{SVG}g") for view in ElementTree.fromstring(path_picture(record).svg))
+    return "N" in [text.text for text in path.iter(f"{SVG}text")]
+
+
+@pytest.mark.parametrize(
+    ("sensors", "known"),
+    [(("imu", "flow_rate", "range"), False), (("flow_rate", "mag"), True), (("gps_velocity",), True)],
+)
+def test_north_has_an_arrow_only_where_a_sensor_tells_it(sensors, known):
+    record = replay()
+    record.tables["innovation"] = fused(*sensors)
+    assert is_north_known(record) == known
+    assert has_arrow(record) == known
+    assert flight_facts(record, [])["north"] == known
+    record.manifest["kind"] = "fly"
+    assert is_north_known(record)
+
+
+@pytest.mark.parametrize(
+    ("error_m", "said"),
+    [((3.5, 3.0, 0.1, 0.1), "height, before the first range"), ((3.5, 3.0, 3.0, 0.1), "height"), ((0.1,) * 4, "north")],
+)
+def test_the_largest_error_is_named_as_of_before_the_first_range(error_m, said):
+    t_s = np.arange(4.0) * 2.0
+    place = {name: np.zeros(4) for name in ("pos_n_m", "pos_e_m", "pos_d_m")}
+    tables = {
+        "truth": {"t_s": t_s, **place},
+        "flown": {"t_s": t_s, **place, "pos_d_m": np.array(error_m)},
+        "innovation": fused("mag", "range"),
+    }
+    states = {"x": {"max_error": 0.2}, "y": {"max_error": 0.1}, "z": {"max_error": max(error_m)}}
+    scores = {"max_position_error_m": max(0.2, *error_m), "states": states}
+    record = Record({"kind": "fly", "scores": scores}, tables)
+    assert first_fused_s(record, Sensor.RANGE) == 2.0
+    assert first_fused_s(record, Sensor.PAD) is None
+    tile = next(tile for tile in tiles(record) if tile.label == "Largest error of one axis")
+    assert tile.note == f"of the autopilot's input: {said}"

@@ -7,7 +7,7 @@ from flownav.live.anchor import PLACES, Anchor
 from flownav.live.answers import UNFUSED, estimate_of, fault_of, why_withheld
 from flownav.live.beginning import ANEW, Beginning
 from flownav.live.filtering import Filtering, Keeper
-from flownav.live.hearing import GPS, Hearing
+from flownav.live.hearing import GPS, WALKS, Hearing
 from flownav.live.horizon import Refused
 from flownav.live.inertial import Heights
 from flownav.live.options import Limits
@@ -82,6 +82,7 @@ class Offering:
         self._begin(t_s)
         if self.filtering.running is not None:
             self.anchor.watch(self.filtering.running, t_s)
+        self.hearing.flow_agrees = self.anchor.agrees(t_s)
         found = self.hearing.serving.alarms(t_s, self.limits.unfused_s)
         for sensor in found.keys() - self.alarms.keys():
             spell = found[sensor]
@@ -96,8 +97,8 @@ class Offering:
 
     def _spoils(self, sensor: Sensor, t_s: float) -> bool:
         """Whether a sensor that does not serve keeps the estimate from being sent: any that tells where the vehicle is,
-        but a GPS that is refused while the flow, which nobody doubts, agrees with the inertial sensors."""
-        refused = self.alarms[sensor].why == Reason.INNOVATION_GATE.label
+        but a GPS that is refused or walks off while the flow, which nobody doubts, agrees with the inertial sensors."""
+        refused = self.alarms[sensor].why in (Reason.INNOVATION_GATE.label, WALKS)
         return sensor in HORIZONTAL and not (sensor in GPS and refused and self.anchor.agrees(t_s))
 
     def judged(self, t_s: float, clock: VehicleClock, resets: int) -> tuple[str, Estimate | None]:

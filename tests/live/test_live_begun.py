@@ -8,9 +8,10 @@ import pytest
 from played_recordings import Played
 from scaled_imu import scaled_imu_beside
 
-NAVIGATOR = (
-    "the navigator learns a gyro bias while the rotor turns the standing vehicle, and holds the compass so weakly that "
-    "heading drifts by 8 deg in 70 s of hover"
+COMPASS = (
+    "the compass of this vehicle has a hard iron of a fifth of the level field, which nobody has calibrated: RAW_IMU's "
+    "heading, with the declination, is 10 deg off where it stands, 3, -8, -7 and 0 at 80, 160, 240 and 275 deg. The "
+    "start takes the autopilot's attitude, 3 deg off, and hover draws it to the compass: 11 deg where the square begins"
 )
 
 
@@ -28,7 +29,7 @@ def test_it_arms_flies_and_lands_without_a_gap(flown):
     assert np.hypot(*flown.error_m[flown.between(0.0, 111.0), :2].T).max() < 1.0
 
 
-@pytest.mark.xfail(strict=True, reason=NAVIGATOR)
+@pytest.mark.xfail(strict=True, reason=COMPASS)
 def test_the_square_is_within_a_metre(flown):
     assert np.hypot(*flown.error_m[:, :2].T).max() < 1.0
 

@@ -127,9 +127,9 @@ def test_a_name_fits_in_the_message_and_is_asked_for_once(make, send):
 
 def test_bits_are_set_and_cleared_beside_the_others():
     rule = next(found for found in knowledge_of(PX4).parameter if found.name == "EKF2_EV_CTRL")
-    assert [rule.fits(number) for number in (0, 5, 7, 13, 15, 1)] == [False, True, True, False, False, False]
-    assert rule.repaired(10) == 7.0
-    assert rule.words() == "bits 0 and 2 set, bit 3 clear"
+    assert [rule.fits(number) for number in (0, 5, 7, 13, 15, 1)] == [False, False, True, False, False, False]
+    assert rule.repaired(18) == 23.0
+    assert rule.words() == "bits 0 and 1 and 2 set, bit 3 clear"
 
 
 @pytest.mark.parametrize(("code", "baud"), [(57, 57600), (115, 115200), (921, 921600), (460, 460800), (57600, 57600)])
@@ -161,6 +161,7 @@ def test_a_vehicle_that_is_set_up_fits(make, parameters):
         (ARDUPILOT, {"RC8_OPTION": 0}, "RCx_OPTION", "unusual"),
         (PX4, {"EKF2_EV_CTRL": 0}, "EKF2_EV_CTRL", "wrong"),
         (PX4, {"EKF2_EV_CTRL": 15}, "EKF2_EV_CTRL", "wrong"),
+        (PX4, {"EKF2_EV_CTRL": 5}, "EKF2_EV_CTRL", "wrong"),  # without the height
         (PX4, {"EKF2_EV_NOISE_MD": 1}, "EKF2_EV_NOISE_MD", "wrong"),
         (PX4, {"EKF2_EV_DELAY": 175.0}, "EKF2_EV_DELAY", "unusual"),
         (PX4, {"EKF2_HGT_REF": 3}, "EKF2_HGT_REF", "unusual"),
@@ -280,7 +281,7 @@ def test_what_must_change_is_written_and_told(loss):
 
 def test_px4_s_integers_are_written_bytewise():
     report, autopilot, _ = checked(PX4, px4(EKF2_EV_CTRL=8, EKF2_EV_NOISE_MD=1), writing=True)
-    assert autopilot.parameters["EKF2_EV_CTRL"] == 5
+    assert autopilot.parameters["EKF2_EV_CTRL"] == 7
     assert autopilot.parameters["EKF2_EV_NOISE_MD"] == 0
     assert report.fits
 

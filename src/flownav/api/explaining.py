@@ -38,7 +38,7 @@ def explain(
         True
     """
     if autopilot is not None and autopilot not in AUTOPILOTS:
-        raise InputError(f"px4, ardupilot or inav are possible")
+        raise InputError(f"{arg('autopilot')} {autopilot}: px4, ardupilot or inav are possible")
 
     from flownav.core.compile import announce_compilation
     from flownav.logs.open_log import open_log

@@ -50,6 +50,7 @@ WITHHELD = {
     "uncertain_down": "the height's standard deviation is too large",
     "flow_doubted": "flow contradicts the inertial sensors, and nothing else holds the position",
     "height_doubted": "the range and another height contradict the inertial sensors",
+    "begins_in_flight": "it began in flight, and range and autopilot do not agree yet on its height",
     "no_pad": "no pad has been seen",
     "nothing_asked": "--send none",
 }

@@ -1,29 +1,40 @@
 """PX4's magnetometer without what its EKF2 has learnt of it in flight.
 
-HIGHRES_IMU gives the calibrated field less the bias that EKF2 estimates from its own heading. Where that heading
-follows ours, an error of ours comes back as a field that agrees with it. SCALED_IMU gives the sensor's own field, which
-is neither calibrated nor, of some sensors, turned into the vehicle's axes. The difference of the two is the calibration
-and EKF2's bias: its change since the start is EKF2's, and is put back.
+HIGHRES_IMU has the calibrated field less the bias that EKF2 estimates from its own heading. Where that heading
+follows ours, an error of ours comes back as a field that agrees with it. SCALED_IMU has the sensor's own field, which
+is neither calibrated nor, of some sensors, turned into the vehicle's axes. The difference of the two is
+
+    (S - 1) own - offset - bias,
+
+with PX4's calibration, a matrix S and an offset, which stand still, and EKF2's bias, which creeps. What the difference
+changes with the vehicle's attitude is S, and stays; what creeps since the start is EKF2's, and is put back. The two are
+told apart by recursive least squares: S is within SCALED_BY, and the bias moves by CREEPS in a second.
 """
 
 import math
 from collections import deque
 from statistics import median
 
+import numpy as np
+
 from flownav.core.frames import Vector
+from flownav.core.measurement import Array
 from flownav.logs.mavlink.framing import Message
 
-MILLI = 1e-3  # SCALED_IMU is in thousandths of gauss
-LEAST_PAIRS = 15  # by which the calibration is known: chosen, a second of PX4's magnetometer
+MILLI = 1e-3  # SCALED_IMU has thousandths of gauss
+LEAST_PAIRS = 15  # by which the difference at the start is known: chosen, a second of PX4's magnetometer
 APART_S = 0.1  # the two are of one instant: chosen
-SMOOTH_S = 3.0  # of the difference; EKF2 learns over tens of seconds: chosen
+SCALED_BY = 0.1  # sigma of each element of S - 1: chosen, PX4's own calibrations are within it
+FIRST_GAUSS = 0.002  # sigma of the difference at the start: chosen
+CREEPS = 0.005  # sigma of what EKF2's bias moves [gauss/sqrt(s)]: chosen, it learns .06 gauss in tens of seconds
+NOISE_GAUSS = 0.05  # of one difference: chosen, so that the bias is followed within 3 s
 MOST_SHARE = (
     0.25  # of the field: a sensor that differs by more may be turned, and its difference turns with the vehicle
 )
 
 
 class Field:
-    """The sensor's own field, compared with the one that EKF2 has changed [gauss]."""
+    """The sensor's own field compared with the one that EKF2 has changed [gauss], vehicle's axes (FRD)."""
 
     def __init__(self) -> None:
         self.clear()
@@ -31,10 +42,12 @@ class Field:
     def clear(self) -> None:
         """Begin anew."""
         self._own: Vector | None = None
-        self._own_s = self._told_s = math.nan
-        self._pairs: deque[Vector] = deque(maxlen=LEAST_PAIRS)
-        self._first: Vector | None = None
-        self._smooth: Vector = (0.0, 0.0, 0.0)
+        self._own_s = self._read_s = math.nan
+        self._pairs: deque[tuple[Vector, Vector]] = deque(maxlen=LEAST_PAIRS)  # own field and difference
+        self._first: Vector | None = None  # the difference at the start, of the field _first_own
+        self._first_own: Vector = (0.0, 0.0, 0.0)
+        self._known = np.zeros((4, 3))  # by axis: the difference at the first field, and S - 1
+        self._covariance = np.diag([FIRST_GAUSS**2, *[SCALED_BY**2] * 3])  # of each column
         self.comparable = True
 
     def sensed(self, message: Message, t_s: float) -> None:
@@ -43,26 +56,41 @@ class Field:
             self._own = MILLI * message.xmag, MILLI * message.ymag, MILLI * message.zmag
             self._own_s = t_s
 
-    def restored(self, told: Vector, t_s: float) -> Vector:
-        """The field of HIGHRES_IMU, with EKF2's subtraction since the start put back."""
+    def restored(self, stated: Vector, t_s: float) -> Vector:
+        """A field of HIGHRES_IMU, with what EKF2 has taken off since the start put back."""
         if self._own is not None and self.comparable and abs(t_s - self._own_s) <= APART_S:
-            self._compare(told, _less(told, self._own), t_s)
+            self._compare(self._own, _less(stated, self._own), math.hypot(*stated), t_s)
         if self._first is None or not self.comparable:
-            return told
-        return _less(told, _less(self._smooth, self._first))
+            return stated
+        x, y, z = self._known[0].tolist()
+        return _less(stated, _less((x, y, z), self._first))
 
-    def _compare(self, told: Vector, off: Vector, t_s: float) -> None:
+    def _compare(self, own: Vector, off: Vector, strength: float, t_s: float) -> None:
         if self._first is not None:
-            share = min(max(t_s - self._told_s, 0.0) / SMOOTH_S, 1.0)
-            x, y, z = (a + share * (b - a) for a, b in zip(self._smooth, off, strict=True))
-            self._smooth = x, y, z
+            self._covariance[0, 0] += CREEPS**2 * max(t_s - self._read_s, 0.0)
+            regressors = np.array([1.0, *_less(own, self._first_own)])
+            self._known, self._covariance = learnt(self._known, self._covariance, regressors, np.array(off))
         else:
-            self._pairs.append(off)
+            self._pairs.append((own, off))
             if len(self._pairs) == LEAST_PAIRS:
-                x, y, z = map(median, zip(*self._pairs, strict=True))
-                self._first = self._smooth = (x, y, z)
-                self.comparable = math.hypot(x, y, z) <= MOST_SHARE * math.hypot(*told)
-        self._told_s = t_s
+                owns, offs = zip(*self._pairs, strict=True)
+                self._first_own, self._first = _middle(owns), _middle(offs)
+                self._known[0] = self._first
+                self.comparable = math.hypot(*self._first) <= MOST_SHARE * strength
+        self._read_s = t_s
+
+
+def learnt(known: Array, covariance: Array, regressors: Array, value: Array) -> tuple[Array, Array]:
+    """One step of recursive least squares: known (n, axes) with covariance (n, n) of each column, after a value (axes,)
+    that is regressors (n,) times it, with noise of NOISE_GAUSS."""
+    spread = covariance @ regressors
+    gain = spread / (regressors @ spread + NOISE_GAUSS**2)
+    return known + np.outer(gain, value - regressors @ known), covariance - np.outer(gain, spread)
+
+
+def _middle(vectors: tuple[Vector, ...]) -> Vector:
+    x, y, z = map(median, zip(*vectors, strict=True))
+    return x, y, z
 
 
 def _less(one: Vector, other: Vector) -> Vector:

@@ -4,19 +4,19 @@ from flownav.core.frames import Vector
 from flownav.core.measurement import Sensor
 from flownav.estimation.gating import Reason
 from flownav.live.anchor import PLACES, Anchor
-from flownav.live.answers import UNFUSED, estimate_of, fault_of, tilt_cosine, why_withheld
+from flownav.live.answers import UNFUSED, estimate_of, fault_of, why_withheld
+from flownav.live.beginning import ANEW, Beginning
 from flownav.live.filtering import Filtering, Keeper
-from flownav.live.hearing import GPS, Hearing
+from flownav.live.hearing import GPS, WALKS, Hearing
 from flownav.live.horizon import Refused
 from flownav.live.inertial import Heights
 from flownav.live.options import Limits
+from flownav.live.origin import Geodetic
 from flownav.live.vehicle_clock import VehicleClock
 from flownav.logs.mavlink.outgoing import Estimate
-from flownav.navigation.loop import Running
 from flownav.navigation.reasons import HORIZONTAL
 
-RECENT_S = 1.0  # an older range or landed state does not determine where a navigator begins: chosen
-HEIGHT_DOUBTED = "height_doubted"
+HEIGHT_DOUBTED, BEGINS_IN_FLIGHT = "height_doubted", "begins_in_flight"
 # Reasons that an unused sensor may cause.
 OUTRANKED = ("", "position_invalid", "dead_reckoning", "flow_doubted", "unprotected")
 NAN = float("nan")
@@ -35,8 +35,9 @@ class Offering:
         self.alarms: dict[Sensor, Refused] = {}
         self.past_alarms: dict[Sensor, Refused] = {}
         self.settled = False
-        self._begun: Running | None = None  # the navigator whose beginning has been judged
-        self._raised_m = 0.0
+        self.beginning = Beginning(filtering)
+        self._doubted: Geodetic | None = None  # the origin that the autopilot was asked about
+        self._opened = False
 
     @property
     def offset_ned_m(self) -> Vector:
@@ -47,22 +48,28 @@ class Offering:
         """
         north_m, east_m, down_m = self.hearing.origin.offset_ned_m
         unknown = not (north_m or east_m or down_m)
-        return north_m, east_m, down_m - self._raised_m if unknown else down_m
+        return north_m, east_m, down_m - self.beginning.raised_m if unknown else down_m
 
-    def _raise(self, t_s: float) -> None:
-        """Judge a navigator once, as soon as it has started."""
-        on, here_ned_m = self.filtering.running, self.filtering.here_ned_m
-        if on is None or here_ned_m is None or on is self._begun:
-            return
-        self._begun, self._raised_m = on, 0.0
+    def _begin(self, t_s: float) -> None:
+        """How high a navigator is that has just started goes into the record."""
         above, landed = (self.hearing.latest.get(sensor) for sensor in (Sensor.RANGE, Sensor.LANDED))
-        if not self.filtering.lacks_gps or above is None or landed is None or landed.value[0]:
-            return
-        if min(above.t_s, landed.t_s) >= t_s - RECENT_S:
-            self._raised_m = max(above.value[0] * tilt_cosine(on.work) + here_ned_m[2], 0.0)
-            self.keeper.note(
-                t_s, "live", "begun_in_flight", "the height is the range's, above the ground", self._raised_m
-            )
+        by = self.beginning.watch(above, landed, t_s)
+        if by == ANEW:
+            self.keeper.note(t_s, "live", "restart", "range and autopilot agree on the height now", NAN)
+        elif by:
+            detail = f"the height above the ground is by {by}"
+            self.keeper.note(t_s, "live", "begun_in_flight", detail, self.beginning.raised_m)
+
+    def asks_where(self, t_s: float) -> bool:
+        """Whether the autopilot is to be asked for its own position from now on: it decides about an origin, or about
+        the height of a navigator that begins in flight."""
+        doubted, opened = self.hearing.origin.doubted, self.beginning.is_open
+        asks = doubted not in (None, self._doubted) or (opened and not self._opened)
+        if doubted not in (None, self._doubted):
+            detail = "it is far off; the autopilot is asked where it is in it"
+            self.keeper.note(t_s, "origin", "doubted", detail, NAN)
+        self._doubted, self._opened = doubted, opened
+        return asks
 
     def begin_anew(self) -> None:
         """The vehicle may be elsewhere now."""
@@ -72,9 +79,10 @@ class Offering:
 
     def watch(self, t_s: float) -> None:
         """Alarms that begin and end go into the record."""
-        self._raise(t_s)
+        self._begin(t_s)
         if self.filtering.running is not None:
             self.anchor.watch(self.filtering.running, t_s)
+        self.hearing.flow_agrees = self.anchor.agrees(t_s)
         found = self.hearing.serving.alarms(t_s, self.limits.unfused_s)
         for sensor in found.keys() - self.alarms.keys():
             spell = found[sensor]
@@ -89,9 +97,8 @@ class Offering:
 
     def _spoils(self, sensor: Sensor, t_s: float) -> bool:
         """Whether a sensor that does not serve keeps the estimate from being sent: any that gives the position,
-        except a GPS that is refused while the flow, which nobody doubts, agrees with the inertial sensors.
-        """
-        refused = self.alarms[sensor].why == Reason.INNOVATION_GATE.label
+        but a GPS that is refused or walks off while the flow, which nobody doubts, agrees with the inertial sensors."""
+        refused = self.alarms[sensor].why in (Reason.INNOVATION_GATE.label, WALKS)
         return sensor in HORIZONTAL and not (sensor in GPS and refused and self.anchor.agrees(t_s))
 
     def judged(self, t_s: float, clock: VehicleClock, resets: int) -> tuple[str, Estimate | None]:
@@ -106,6 +113,8 @@ class Offering:
             reason = "" if t_s - self.filtering.newest_imu_s <= limits.age_s else "stale"
         if on is not None and self.heights.doubted(on.clock_s) and reason in ("", *PLACES):
             reason = HEIGHT_DOUBTED
+        if self.beginning.is_open and reason in ("", *PLACES):
+            reason = BEGINS_IN_FLIGHT
         if not reason and not self.settled and self.hearing.origin.doubted is not None:
             reason = "origin_doubted"
         if on is None or (reason and reason not in PLACES):

@@ -48,7 +48,6 @@ class Session:
         )
         self._others_said = 0
         self.backlog = Backlog() if options.capacity_bytes_s is None else None  # a line of a known pace is kept to it
-        self._doubted: tuple[float, float, float] | None = None
         self.rates = Rates(options.capacity_bytes_s, options.send, signed=options.key is not None)
         self.answers, self.requests, self.simulator = Answers(options), Requests(self.rates), Simulator()
         self.filtering = Filtering(options, keeper)
@@ -178,6 +177,7 @@ class Session:
         elif name == LOCAL_POSITION:
             said = STATES[name](message)
             if isinstance(said, LocalState):
+                self.offering.beginning.state_height(-said.pos_ned_m[2], clock.now_s(now_s))
                 self.offering.say_origin(self.hearing.origin.stands(said.pos_ned_m), clock.now_s(now_s))
         elif name in TRUTHS:
             state, t_s = STATES[name](message), clock.now_s(now_s)
@@ -227,10 +227,8 @@ class Session:
         if self.clock is None or self.reception.vehicle is None:
             return
         t_s = self.clock.now_s(now_s)
-        if hearing.origin.doubted not in (None, self._doubted):
+        if self.offering.asks_where(t_s):
             self.requests.revise(self.reception.vehicle, now_s, {LOCAL_POSITION: (32, 2.0)})
-            self.keeper.note(t_s, "origin", "doubted", "it is far off; the autopilot is asked where it is in it", NAN)
-        self._doubted = hearing.origin.doubted
         if self.origin_deg_m is not None and self.origin_deg_m != self._origin_kept:
             self._origin_kept = self.origin_deg_m
             self.keeper.origin(t_s, self.origin_deg_m)

@@ -20,7 +20,7 @@ from cuda import pathfinder
 from flownav.campaigns.cuda import Cuda, truths_of
 from flownav.campaigns.device_flight import take_here
 from flownav.core.compiling.device import call_instead, lowered
-from flownav.core.compiling.launch import argument_type, per_thread, told_names
+from flownav.core.compiling.launch import argument_names, argument_type, per_thread
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario, with_filter
 
@@ -56,7 +56,7 @@ class Compiling:
 
     def run(self, function: Callable[..., None], threads: int, told: dict[str, Any], constants: dict[str, Any]) -> None:
         """Compile the function for an H200."""
-        arguments = (threads, *(told[name] for name in told_names(function, constants)))
+        arguments = (threads, *(told[name] for name in argument_names(function, constants)))
         began_s = time.perf_counter()
         library = lowered(per_thread(function, constants), tuple(map(argument_type, arguments)), H200)
         lowered_s = time.perf_counter()

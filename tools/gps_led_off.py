@@ -15,7 +15,7 @@ import numpy as np
 
 from flownav.campaigns.faults.catalogue import Fault
 from flownav.campaigns.faults.inject import displaced
-from flownav.campaigns.faults.navigator import Navigate, Navigated, navigator_told
+from flownav.campaigns.faults.navigator import Navigate, Navigated, navigator_with
 from flownav.campaigns.faults.table import BASE, flight_at, window_start
 from flownav.core.measurement import Sensor
 from flownav.simulation.assemble import assemble
@@ -77,7 +77,7 @@ def main(seeds: int) -> None:
     """Print the table."""
     fitted = assemble(load_scenario(BASE)).fitted
     assert fitted is not None
-    navigate = navigator_told(fitted.told)
+    navigate = navigator_with(fitted.given)
     print("| rate [m/s] | flights | doubted [%] | after, median [s] | led off, median [m] | most [m] | < 1 m [%] |")
     print("|---:|---:|---:|---:|---:|---:|---:|")
     for rate_m_s in RATES_M_S:

@@ -10,7 +10,7 @@ import sys
 
 import numpy as np
 
-from flownav.campaigns.faults.navigator import Navigate, navigator_told
+from flownav.campaigns.faults.navigator import Navigate, navigator_with
 from flownav.campaigns.faults.score import course_of
 from flownav.campaigns.faults.table import BASE, HEIGHTS_M, flight_at, log_of, scenario_at, stood, window_start
 from flownav.campaigns.local import fly_recorded
@@ -41,7 +41,7 @@ def main(seeds: int) -> None:
     """Print the table."""
     fitted = assemble(load_scenario(BASE)).fitted
     assert fitted is not None
-    navigate = navigator_told(fitted.told)
+    navigate = navigator_with(fitted.given)
     print("| sensors and vehicle | flights | median | 95 % | 99.9 % | most |\n|---|---:|---:|---:|---:|---:|")
     for name, flight in (("as their sheets say", flight_at), ("drawn", drawn_flight)):
         each = [

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from flownav.campaigns.faults.catalogue import DEGREE_S, FAULTS, Fault
 from flownav.campaigns.faults.inject import biased
-from flownav.campaigns.faults.navigator import Navigate, Navigated, navigator_told, started
+from flownav.campaigns.faults.navigator import Navigate, Navigated, navigator_with, started
 from flownav.campaigns.faults.score import course_of
 from flownav.campaigns.faults.table import (
     AFTER_S,
@@ -40,7 +40,7 @@ from flownav.core.version import __version__
 from flownav.estimation.states import HYPOTHESES
 from flownav.navigation.flags import flagged
 from flownav.navigation.loop import run
-from flownav.navigation.settings_of import Told
+from flownav.navigation.settings_of import GivenSettings
 from flownav.navigation.tape import EVENT_NAMES, FAULT_SUSPECTED
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario
@@ -219,7 +219,7 @@ def _pair(values: Array) -> tuple[float, float]:
 
 
 # -- what it costs -----------------------------------------------------------------------------------------------
-def cost(told: Told, streams: dict[Sensor, Stream], repeats: int = 15) -> float:
+def cost(told: GivenSettings, streams: dict[Sensor, Stream], repeats: int = 15) -> float:
     """The navigator's time over a log with faults followed, divided by that without; medians of alternating runs."""
     spent_s: dict[bool, list[float]] = {True: [], False: []}
     clock: Callable[[], float] = time.perf_counter
@@ -320,14 +320,14 @@ def main(page: Path, seeds: int | None = None, faulty_seeds: int | None = None) 
     placed(placed(text, "", str(page)), "", str(page), WHEN_BEGIN, WHEN_END)
     fitted = assemble(load_scenario(BASE)).fitted
     assert fitted is not None
-    navigate = navigator_told(fitted.told)
+    navigate = navigator_with(fitted.given)
     few = range(FIRST_SEED, FIRST_SEED + (seeds or LONG_SEEDS))
     lasting = list(counted(fly(navigate, few, (), durations_s=(LONG_S,))))
     if seeds is None or faulty_seeds is not None:
         counts = (FAULTY_SEEDS, CLEAN_SEEDS) if faulty_seeds is None else (faulty_seeds, 4 * faulty_seeds)
         faulty, clean = (range(FIRST_SEED, FIRST_SEED + count) for count in counts)
         rows = rows_of(counted(fly(navigate, faulty, clean)))
-        spent = cost(fitted.told, flight_at(1.5, 5.0, FIRST_SEED).streams)
+        spent = cost(fitted.given, flight_at(1.5, 5.0, FIRST_SEED).streams)
         found = section(rows, rows_of(lasting), (clean[0], clean[-1]), spent)
         text = placed(text, found, str(page))
         print(found)

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.optimize import differential_evolution, minimize
 
 from flownav.control import learnt_shapes
-from flownav.control.design import gains_for, told_before
+from flownav.control.design import gains_for, nominal_model
 from flownav.control.gains import AutopilotGains
 from flownav.control.learnt_gains import shape_at
 from flownav.control.loops import spectral_radius
@@ -71,7 +71,7 @@ def hover_trim(vehicle: VehicleParameters) -> Trim:
 
 def at_node(vehicle: VehicleParameters, name: str, stiffness: float, lag_s: float) -> VehicleParameters:
     """The vehicle with this stiffness [1/s2] of one axis and this lag."""
-    told = told_before(vehicle, hover_trim(vehicle), -1)
+    told = nominal_model(vehicle, hover_trim(vehicle), -1)
     own = told.pitch_stiffness_1_s2 if name == "forward" else told.roll_stiffness_1_s2
     faster = lag_of(vehicle) / lag_s
     return vehicle._replace(

@@ -137,24 +137,24 @@ lens = { forward_m = -0.1, down_m = 0.15 }
 # - `says`: the kind of each reading, and which fields of it are the values (and variances, where the sensor states
 #   them). The kind decides which judge of the navigator takes it; a distance is `Sensor.RANGE`. Sensors of one kind
 #   must be equally old on arrival.
-# - `see`: what the sensor looks at, a law of the plant's records. `see_beam` is the sonar's; others are in `seeing.py`.
+# - `see`: what the sensor looks at, a law of the plant's records. `see_beam` is the sonar's; others are in `views.py`.
 # - `channels`: where its normals begin in the noise counter, in pairs: of a reading, of a start, of a fault. Below 256;
 #   nothing may overlap.
 # - `late`: a flight of an ensemble may have it older than its datasheet says. `lever`: where the datasheet says that
 #   its lens is.
 #
-# In flownav itself the row stands in `simulation/carried.py` and the datasheet in `data/sensors/`; from outside,
+# In flownav itself the row stands in `simulation/sensor_table.py` and the datasheet in `data/sensors/`; from outside,
 # `carry` adds it before the simulator is imported.
 
 # %%
 from flownav.core.measurement import Sensor
-from flownav.simulation.carried import CarriedSensor, Channels, Said, carry
-from flownav.simulation.seeing import see_beam, told
+from flownav.simulation.sensor_table import Channels, Output, SensorRow, carry
+from flownav.simulation.views import reads, see_beam
 
-LASER = CarriedSensor(
+LASER = SensorRow(
     "laser",
     LaserSheet,
-    says=(Said(Sensor.RANGE, told(LaserReading, ("range_m",))),),
+    says=(Output(Sensor.RANGE, reads(LaserReading, ("range_m",))),),
     draw=draw_laser,
     start=start_laser,
     step=step_laser,

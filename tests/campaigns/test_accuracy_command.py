@@ -85,7 +85,7 @@ def test_what_is_not_carried_is_not_in_the_timetable(approach):
 
 
 def test_the_constant_noise_is_the_schedules_root_mean_square(approach):
-    noise = approach.fitted.told.noise
+    noise = approach.fitted.given.noise
     constant = constant_flow_noise(noise)
     sigma = [flow_noise_sigma(h, constant) for h in (0.3, 1.0, 3.0)]
     assert np.ptp(sigma) == 0.0
@@ -96,7 +96,7 @@ def test_the_constant_noise_is_the_schedules_root_mean_square(approach):
 
 
 def test_without_its_error_states_all_of_the_gps_error_is_white(approach):
-    told = approach.fitted.told
+    told = approach.fitted.given
     before, after = told.settings, without_gps_states(told).settings
     none = ("gps_slow_sigma_m", "gps_slow_sigma_down_m", "gps_fast_sigma_m", "gps_fast_sigma_down_m",
             "gps_velocity_sigma_m_s")  # fmt: skip
@@ -109,8 +109,8 @@ def test_without_its_error_states_all_of_the_gps_error_is_white(approach):
 
 
 def test_without_its_deviation_states_all_of_the_compass_error_is_noise(approach):
-    before = approach.fitted.told.settings
-    after = without_compass_states(approach.fitted.told).settings
+    before = approach.fitted.given.settings
+    after = without_compass_states(approach.fitted.given).settings
     assert after.compass_sigma_rad == 0.0 < before.compass_sigma_rad
     assert after.heading_noise_rad == pytest.approx(np.hypot(before.heading_noise_rad, before.compass_sigma_rad))
 

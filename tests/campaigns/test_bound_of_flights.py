@@ -37,7 +37,7 @@ def hover():
 
 def gps_variance(setup):
     """Of one height, as the navigator has it: the white part, and its share of what the receiver states."""
-    settings, fed = setup.fitted.told.settings, fly_recorded(setup, 1).tables["fed"]
+    settings, fed = setup.fitted.given.settings, fly_recorded(setup, 1).tables["fed"]
     stated = fed["variance_2"][fed["sensor"] == Sensor.GPS_POSITION][0]
     return settings.gps_white_sigma_down_m**2 + settings.gps_white_share**2 * stated
 
@@ -47,7 +47,7 @@ def start_bias_variance(setup):
     readings.
     """
     spread = fly_recorded(setup, 1).tables["states"]["std_accel_bias_z_m_s2"][0]
-    assert spread > setup.fitted.told.settings.accel_bias_sigma_m_s2
+    assert spread > setup.fitted.given.settings.accel_bias_sigma_m_s2
     return spread**2
 
 
@@ -59,7 +59,7 @@ def first_epoch(setup):
 
 def vertical_channel(setup, steps):
     """Height, vertical speed and accelerometer bias as a model of its own, at the IMU's steps."""
-    s = setup.fitted.told.settings
+    s = setup.fitted.given.settings
     dt, noise, none = IMU_S, gps_variance(setup), (np.zeros((0, 3)), np.zeros((0, 0)))
     transition = np.array([[1.0, dt, -0.5 * dt * dt], [0.0, 1.0, -dt], [0.0, 0.0, 1.0]])
     vertical = s.accel_noise_m_s2_rt_hz * s.accel_noise_down_share

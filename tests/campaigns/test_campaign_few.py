@@ -9,7 +9,7 @@ import pytest
 
 from flownav.campaigns.measures import FIGURES, ROW_COLUMNS, flights_needed
 from flownav.campaigns.summary import figures_of
-from flownav.cli.campaign_said import _of_figure
+from flownav.cli.campaign_output import _of_figure
 from flownav.report.campaign import sentence as page_sentence
 from flownav.report.campaign_figures import Touchdowns, common_reach_m, tails
 from flownav.report.cloud_picture import cloud_picture

@@ -13,7 +13,7 @@ import device_cases
 from flownav.campaigns.device_flight import take_here
 from flownav.core.compile import equation
 from flownav.core.compiling.device import compile_for_device
-from flownav.core.compiling.launch import argument_type, compiled, flattened, per_thread, told_names
+from flownav.core.compiling.launch import argument_names, argument_type, compiled, flattened, per_thread
 
 pytest.importorskip("numba_cuda", reason="numba-cuda is not installed (extra gpu)")
 pathfinder = pytest.importorskip("cuda.pathfinder", reason="numba-cuda is not installed (extra gpu)")
@@ -42,7 +42,7 @@ class Recorder:
         self.free_bytes = device.free_bytes
 
     def run(self, function, threads, told, constants):
-        self.asked = function, (threads, *(told[name] for name in told_names(function, constants))), constants
+        self.asked = function, (threads, *(told[name] for name in argument_names(function, constants))), constants
         self.device.run(function, threads, told, constants)
 
 

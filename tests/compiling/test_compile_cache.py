@@ -333,14 +333,14 @@ def test_the_closure_holds_what_is_imported_and_no_face(tmp_path):
 def test_what_a_process_adds_to_a_module_is_part_of_whatever_imports_it(tmp_path):
     sources = closure.Sources(tmp_path / "sources.json")
     before, apart = sources.stamp(["flownav.simulation.flight"]), sources.stamp(["flownav.core.frames"])
-    sources.extend("flownav.simulation.carried", ["flownav.lab.optics.camera"], "one more")
+    sources.extend("flownav.simulation.sensor_table", ["flownav.lab.optics.camera"], "one more")
     after = sources.stamp(["flownav.simulation.flight"])
     assert after not in (before, None)
     assert "flownav.lab.optics.camera" in sources.closure(["flownav.simulation.flight"])
     assert sources.stamp(["flownav.core.frames"]) == apart
-    sources.extend("flownav.simulation.carried", [], "another")
+    sources.extend("flownav.simulation.sensor_table", [], "another")
     assert sources.stamp(["flownav.simulation.flight"]) not in (before, after, None)
-    sources.extend("flownav.simulation.carried", ["__main__ of a notebook"], "")  # nobody knows what is in it
+    sources.extend("flownav.simulation.sensor_table", ["__main__ of a notebook"], "")  # nobody knows what is in it
     assert sources.stamp(["flownav.simulation.flight"]) is None
     assert sources.stamp(["flownav.core.frames"]) == apart
 

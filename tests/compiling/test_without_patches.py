@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from flownav.core.compiling import remembered
+from flownav.core.compiling import memo
 from flownav.core.compiling.level import Leanness
 
 # records in a lane buffer and as arguments, a branch, two loops; then a flight of the vehicle alone, without pilot
@@ -85,13 +85,13 @@ assert np.isfinite(work).all()
 from numba.core import types
 from numba.core.datamodel.registry import default_manager
 
-from flownav.core.compiling import remembered, target
+from flownav.core.compiling import memo, target
 
 with target.lean():
-    replaced = [name for owner, name, other in remembered.PATCHES if vars(owner).get(name) is other]
-again = [name for owner, name, other in remembered.PATCHES if vars(owner).get(name) is other]
+    replaced = [name for owner, name, other in memo.PATCHES if vars(owner).get(name) is other]
+again = [name for owner, name, other in memo.PATCHES if vars(owner).get(name) is other]
 whole = default_manager._handlers[types.NamedTuple].__module__.startswith("flownav.")
-written = "flownav.core.compiling.spelled" in sys.modules
+written = "flownav.core.compiling.intrinsics" in sys.modules
 found = {"kernel": digest(work), "replaced": replaced, "again": again, "whole": whole, "written": written}
 from flownav.studies.benchmark.vehicles import landing_of, plant_after
 
@@ -121,7 +121,7 @@ def computed(tmp_path_factory):
 def test_with_the_switch_nothing_of_numba_is_replaced(computed):
     plain, usual = computed[True], computed[False]
     assert (plain["replaced"], plain["whole"], plain["written"]) == ([], False, False)
-    assert len(usual["replaced"]) == len(remembered.PATCHES)
+    assert len(usual["replaced"]) == len(memo.PATCHES)
     assert (usual["whole"], usual["written"], usual["again"]) == (True, True, [])
 
 
@@ -140,11 +140,11 @@ class Owner:
 
 def test_a_part_that_numba_does_not_have_is_left_alone(monkeypatch):
     wanted = ((Owner, "kept", staticmethod(lambda: "ours")), (Owner, "gone", staticmethod(lambda: "ours")))
-    monkeypatch.setattr(remembered, "PATCHES", wanted)
-    with remembered.remembering():
+    monkeypatch.setattr(memo, "PATCHES", wanted)
+    with memo.memoising():
         assert Owner.kept() == "ours"
         assert not hasattr(Owner, "gone")
     assert Owner.kept() == "own"
     monkeypatch.setattr(Leanness, "wanted", False)
-    with remembered.remembering():
+    with memo.memoising():
         assert Owner.kept() == "own"

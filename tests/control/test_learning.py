@@ -11,7 +11,7 @@ from scipy.special import erf
 from scipy.stats import binomtest
 
 from flownav.control import learning
-from flownav.control.design import gains_for, told_before
+from flownav.control.design import gains_for, nominal_model
 from flownav.control.learning import (
     AXIS,
     EPOCH_S,
@@ -25,7 +25,7 @@ from flownav.control.learning import (
     note_line,
     solved,
 )
-from flownav.control.learnt_gains import BEYOND, LEAST_SURE, LoopGains, as_told, gains_with, judged, shaped
+from flownav.control.learnt_gains import BEYOND, LEAST_SURE, LoopGains, gains_with, judged, loop_gains_of, shaped
 from flownav.control.learnt_margins import margins_of_learnt
 from flownav.control.learnt_model import Line, Servo, answered, error_function, residual_of
 from flownav.control.learnt_shapes import (
@@ -44,7 +44,7 @@ from flownav.vehicle.trim import trim
 
 VEHICLE = load_vehicle()
 HOVER = trim(VEHICLE)
-TOLD = told_before(VEHICLE, HOVER, 0)
+TOLD = nominal_model(VEHICLE, HOVER, 0)
 GAINS = gains_for(VEHICLE, HOVER, 0.0)
 SUB = 5  # the attitude loop's steps in an epoch
 
@@ -239,7 +239,7 @@ def test_too_unsure_or_outside_the_table_is_no_vehicle_to_shape_gains_for():
     assert judged(learnt_as(pitch=1.01 * last)).state == -3.0
     assert judged(learnt_as(roll=0.99 * float(np.exp(ROLL_NODES[0] - BEYOND)))).state == -3.0
     assert judged(learnt_as(lag_s=0.1)).state == -3.0
-    before = as_told(GAINS)
+    before = loop_gains_of(GAINS)
     for state in (0.0, -1.0, -2.0, -3.0):
         assert shaped(before, learnt_as(state=state)) == before
 
@@ -247,7 +247,7 @@ def test_too_unsure_or_outside_the_table_is_no_vehicle_to_shape_gains_for():
 def test_gains_are_those_of_the_table_at_its_nodes_and_between_them_in_between():
     for i, pitch in enumerate(np.exp(PITCH_NODES)):
         for m, lag in enumerate(np.exp(LAG_NODES)):
-            found = shaped(as_told(GAINS), learnt_as(pitch=float(pitch), lag_s=float(lag)))
+            found = shaped(loop_gains_of(GAINS), learnt_as(pitch=float(pitch), lag_s=float(lag)))
             tilt, integral, lead, velocity, distance, gust = np.exp(PITCH_SHAPES[i, m])
             assert found.pitch_gain == pytest.approx(tilt * lag / (TOLD.flap_rate_1_s * lag_of(TOLD)))
             assert found.pitch_integral == pytest.approx(found.pitch_gain * integral)
@@ -256,9 +256,11 @@ def test_gains_are_those_of_the_table_at_its_nodes_and_between_them_in_between()
             assert found.forward_integral == pytest.approx(distance)
             assert found.gust_decay_forward == pytest.approx(math.exp(-EPOCH_S / gust))
     low, high = (float(np.exp(ROLL_SHAPES[k, 0, 3])) for k in (1, 2))
-    middle = shaped(as_told(GAINS), learnt_as(roll=float(np.exp(0.5 * (ROLL_NODES[1] + ROLL_NODES[2]))), lag_s=0.045))
+    middle = shaped(
+        loop_gains_of(GAINS), learnt_as(roll=float(np.exp(0.5 * (ROLL_NODES[1] + ROLL_NODES[2]))), lag_s=0.045)
+    )
     assert middle.right_gain == pytest.approx(math.sqrt(low * high))
-    assert gains_with(GAINS, as_told(GAINS)) == GAINS
+    assert gains_with(GAINS, loop_gains_of(GAINS)) == GAINS
     changed = gains_with(GAINS, middle)
     assert LoopGains(*(getattr(changed, name) for name in LoopGains._fields)) == middle
 
@@ -268,7 +270,7 @@ def test_gains_are_those_of_the_table_at_its_nodes_and_between_them_in_between()
 )
 def test_the_gains_keep_45_degrees_and_6_db_over_the_box_of_what_was_learnt(pitch, roll, lag_s):
     learnt = learnt_as(pitch, roll, lag_s, std=0.04)
-    with_them = gains_with(GAINS, shaped(as_told(GAINS), learnt))
+    with_them = gains_with(GAINS, shaped(loop_gains_of(GAINS), learnt))
     box = margins_of_learnt(VEHICLE, HOVER, learnt, with_them)
     for row in box.rows:
         assert row.margins.phase_deg >= LEAST_PHASE_DEG - 0.5, row

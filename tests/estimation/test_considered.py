@@ -34,9 +34,9 @@ from flownav.estimation.states import (
     STATES,
 )
 from flownav.navigation.flow import consider_others
+from flownav.navigation.kernel_settings import FROM_MAG, NO_HEADING, Equipment
 from flownav.navigation.memory import HEADING_SOUGHT, new_work
 from flownav.navigation.take import consider_datum
-from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
 from packed_covariance import pack, unpack
 
 SEEDS = st.integers(0, 2**32 - 1)

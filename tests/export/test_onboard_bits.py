@@ -42,7 +42,7 @@ def same_digests(readings: Sequence[Given], *boards: Board | LibraryBoard, every
             found = {on.digest() for on in boards}
             assert len(found) == 1, count
             told = [on.now(given.t_s) for on in boards]
-            for field in told[0]._fields if told[0].status == progress.TOLD else ("status",):
+            for field in told[0]._fields if told[0].status == progress.STATE_GIVEN else ("status",):
                 for other in told[1:]:
                     np.testing.assert_array_equal(getattr(other, field), getattr(told[0], field))
 
@@ -53,7 +53,7 @@ def test_a_library_knows_after_each_reading_what_python_does(target, tmp_path):
     assert not lag
     there = library_board(target, settings, RATES.sizes, tmp_path)
     same_digests(arriving(FLOWN)[:1500], there, Board(settings, RATES.sizes))
-    assert there.now(7.0).status == progress.TOLD
+    assert there.now(7.0).status == progress.STATE_GIVEN
 
 
 @pytest.mark.parametrize("absent", WITHOUT_SENSORS)
@@ -66,7 +66,7 @@ def test_vehicles_that_lack_a_sensor(absent, tmp_path):
     boards = [library_board(target, settings, rates.sizes, tmp_path) for target in targets]
     readings = arriving(flown)[:700]
     same_digests(readings, *boards, Board(settings, rates.sizes))
-    assert boards[0].now(readings[-1].t_s).status == progress.TOLD
+    assert boards[0].now(readings[-1].t_s).status == progress.STATE_GIVEN
 
 
 @pytest.mark.slow

@@ -84,7 +84,7 @@ def frames_of(log) -> list[bytes]:
     return vehicle.due(vehicle.end_s, UNIX_S)
 
 
-def said_by(piece: bytes) -> list:
+def logged_digests(piece: bytes) -> list:
     reader, decoder = StreamFrames(), coder()
     return [decoder.decode(bytearray(content)) for _, content in reader.feed(piece)]
 
@@ -92,7 +92,7 @@ def said_by(piece: bytes) -> list:
 def as_python_hears(frames: list[bytes], board: Board, every_s: float = 0.02 - 1e-4):
     """The board fed with what messages say, and what it tells after inertial readings: rows of time and state."""
     origin, newest_s, told_s, fix_us, rows = None, 0.0, -1.0, None, []
-    for message in said_by(b"".join(frames)):
+    for message in logged_digests(b"".join(frames)):
         name = message.msgname
         if name not in (
             "HIGHRES_IMU",
@@ -127,7 +127,12 @@ def as_python_hears(frames: list[bytes], board: Board, every_s: float = 0.02 - 1
         if any(each.sensor == Sensor.IMU for each in found) and newest_s - told_s >= every_s:
             told_s = newest_s
             now = board.now(newest_s)
-            flies = now.status == progress.TOLD and now.aid != 2.0 and not now.suspected and now.protection_m[0] <= 10.0
+            flies = (
+                now.status == progress.STATE_GIVEN
+                and now.aid != 2.0
+                and not now.suspected
+                and now.protection_m[0] <= 10.0
+            )
             if flies:
                 rows.append(now)
     return rows
@@ -144,7 +149,7 @@ def test_it_says_what_python_says_of_the_same_messages(told, log, record):
     rates = rates_of(flight.segment, 0.27)._replace(others_hz=400.0)
     settings, lag = packed_settings(flight, pace_of(flight.settings, rates.horizon_s))
     rows = as_python_hears(frames_of(log), Board(settings, rates.sizes, lag=lag))
-    said = [message for message in said_by(told.stdout) if message.msgname == "ODOMETRY"]
+    said = [message for message in logged_digests(told.stdout) if message.msgname == "ODOMETRY"]
     common = {message.time_usec for message in said} & {round(row.t_s * 1e6) for row in rows}
     assert len(common) > 2400
     assert len(said) + len(rows) - 2 * len(common) <= 2  # its GPS is Python's to the last bit but one
@@ -171,14 +176,16 @@ def test_it_flies_as_flownav_live_does(told, setup, log):
     options = Options(
         gps_delay_s=float(fitted.ages_s[Sensor.GPS_POSITION]),
         identified=IdentifiedFlow(1.0, 1.0, float(fitted.ages_s[Sensor.FLOW_RATE])),
-        settings=fitted.told.settings, flow_noise=fitted.told.noise,
+        settings=fitted.given.settings, flow_noise=fitted.given.noise,
     )  # fmt: skip
     vehicle, clock = SimulatedVehicle(log), Clock()
     link, session = link_to(vehicle, clock), Session(options, Keeper(), 0.0, UNIX_S)
     run_session(session, link, Latency(), lambda: vehicle.finished, clock=clock)
     link.close()
     live = np.array([[m.time_usec * 1e-6, m.x, m.y, m.z] for _, m in vehicle.received if m.msgname == "ODOMETRY"])
-    own = np.array([[m.time_usec * 1e-6, m.x, m.y, m.z] for m in said_by(told.stdout) if m.msgname == "ODOMETRY"])
+    own = np.array(
+        [[m.time_usec * 1e-6, m.x, m.y, m.z] for m in logged_digests(told.stdout) if m.msgname == "ODOMETRY"]
+    )
     common = live[(live[:, 0] > own[0, 0] + 5.0) & (live[:, 0] < own[-1, 0])]
     there = np.column_stack([np.interp(common[:, 0], own[:, 0], own[:, i]) for i in (1, 2, 3)])
     apart_m = np.linalg.norm(there - common[:, 1:] - np.mean(there - common[:, 1:], axis=0), axis=1)
@@ -226,7 +233,7 @@ def test_it_answers_over_udp(program, log):
                 own.send(frame)
                 if number % 20 == 0:
                     time.sleep(0.001)  # the system keeps few datagrams that nobody has read
-            while not any(message.msgname == "ODOMETRY" for message in said_by(own.recv(4096))):
+            while not any(message.msgname == "ODOMETRY" for message in logged_digests(own.recv(4096))):
                 pass  # what it says before; TimeoutError where it never comes
         finally:
             running.kill()

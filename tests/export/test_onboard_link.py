@@ -140,7 +140,7 @@ def test_a_session_and_the_library_say_the_same_of_one_recorded_link(
     there = told_by(target, steps, tmp_path)
     assert len(there) == len(told) > 200
     for here, found in zip(told, there, strict=True):
-        assert found.status == progress.TOLD
+        assert found.status == progress.STATE_GIVEN
         for name, value in here.row._asdict().items():
             np.testing.assert_array_equal(getattr(found, name), value, err_msg=f"{name} at {here.t_s}")
     _, again = flown(monkeypatch, frames, iter(there))

@@ -13,14 +13,14 @@ from flownav.estimation.motion import add_motion_noise, errors_in_motion
 from flownav.estimation.states import ATTITUDE, GYRO_BIAS, PLACES, POSITION, ROWS_BY_NAME, STATE, STATES, VELOCITY
 from flownav.export.onboard.board import NOTHING, Board
 from flownav.navigation import onboard, progress
-from flownav.navigation.inertial import motion_between, remembered
+from flownav.navigation.inertial import last_motion, motion_between
+from flownav.navigation.kernel_settings import Equipment
 from flownav.navigation.loop import run, start_navigator
 from flownav.navigation.memory import CLOCK, OWN_FILTER, PROTECTION, load_aid, load_imu
-from flownav.navigation.now import Carried, carried, state_of
+from flownav.navigation.now import NowState, moved_on, state_of
 from flownav.navigation.rings import Given, Rings, given_of, numbers_of
 from flownav.navigation.rows import EventRow, InnovationRow
 from flownav.navigation.tape import new_tape
-from flownav.navigation.told import Equipment
 from navigation_streams import circle, fly
 from onboard_readings import RATES, arriving, as_prepared, flight_of, settings_of, spoilt
 from packed_covariance import pack, unpack
@@ -59,7 +59,7 @@ def test_readings_that_come_in_any_order_are_fed_in_that_of_their_instants_with_
     differ = np.flatnonzero(~same(late.work[:OWN_FILTER], sorted_.work[:OWN_FILTER]))
     assert not len(differ), differ[:10]
     assert late.digest() == sorted_.digest()
-    assert late.now(12.0).status == progress.TOLD
+    assert late.now(12.0).status == progress.STATE_GIVEN
 
 
 def test_it_is_what_replay_makes_of_the_same_readings():
@@ -104,7 +104,7 @@ def test_the_way_through_a_gap_is_shared_among_calls():
     while on.take(NOTHING).head.parts > 0.0:
         calls += 1
     assert 20 <= calls <= 80  # 80 steps of 0.1 s, four in a call, after what waits before the gap
-    assert on.now(newest + 8.5).status == progress.TOLD
+    assert on.now(newest + 8.5).status == progress.STATE_GIVEN
 
 
 # -- the state of now -------------------------------------------------------------------------------------------
@@ -129,18 +129,18 @@ def test_the_state_of_now_is_what_python_carries_on(ahead_s):
     covariance_is_as_python_has_it(on, told, t_s)
 
 
-def carried_on(work: np.ndarray, imu: np.ndarray, t_s: float) -> tuple[Carried, np.ndarray]:
+def carried_on(work: np.ndarray, imu: np.ndarray, t_s: float) -> tuple[NowState, np.ndarray]:
     """The state of work at an instant by the laws as plain Python, and the rate; imu: what came after its clock."""
-    state, at_s, before = state_of(work, ONE_LANE, 0), work[CLOCK], remembered(load_imu(work, ONE_LANE, 0))
+    state, at_s, before = state_of(work, ONE_LANE, 0), work[CLOCK], last_motion(load_imu(work, ONE_LANE, 0))
     for row in imu[imu[:, 0] < t_s]:
-        state = carried(state, motion_between(before, tuple(row[1:]), FLIGHT.settings.imu_integrates), row[0] - at_s)
+        state = moved_on(state, motion_between(before, tuple(row[1:]), FLIGHT.settings.imu_integrates), row[0] - at_s)
         at_s, before = row[0], tuple(row[1:])
     after = imu[imu[:, 0] >= t_s]
     newest = after[-1, 1:4] if len(after) else np.array(before[:3])
     if len(after):
         before = motion_between(before, tuple(after[0, 1:]), FLIGHT.settings.imu_integrates)
     if t_s > at_s:
-        state = carried(state, before, t_s - at_s)
+        state = moved_on(state, before, t_s - at_s)
     return state, newest - state[10:13]
 
 
@@ -195,9 +195,9 @@ def test_in_flight_the_state_of_now_is_told_after_every_reading():
     for given in arriving(FLOWN):
         on.take(given)
         said.append(on.now(given.t_s).status)
-    started = said.index(progress.TOLD)
+    started = said.index(progress.STATE_GIVEN)
     assert started < 300
-    assert set(said[started:]) == {progress.TOLD}
+    assert set(said[started:]) == {progress.STATE_GIVEN}
 
 
 def test_before_the_start_and_long_after_the_last_reading_nothing_is_told():
@@ -206,7 +206,7 @@ def test_before_the_start_and_long_after_the_last_reading_nothing_is_told():
     on = fed(arriving(FLOWN)[:900])
     assert on.now(float(on.work[CLOCK]) + 2.1).status == progress.STALE
     assert on.now(float(on.work[CLOCK]) - 0.1).status == progress.STALE
-    assert on.now(float(on.work[CLOCK]) + 1.9).status == progress.TOLD
+    assert on.now(float(on.work[CLOCK]) + 1.9).status == progress.STATE_GIVEN
     assert np.isfinite(on.work[STATE : STATE + 3]).all()
 
 
@@ -262,7 +262,7 @@ def test_a_time_that_leaps_is_believed_when_three_agree():
 @pytest.mark.parametrize("leap_s", [1000.0, -500.0])
 def test_after_a_leap_too_far_it_begins_anew(leap_s):
     on = fed(arriving(FLOWN)[:900])
-    assert on.now(float(on.work[CLOCK])).status == progress.TOLD
+    assert on.now(float(on.work[CLOCK])).status == progress.STATE_GIVEN
     said = [status(on, imu(leap_s + 0.01 * k)) for k in range(3)]
     assert said == [progress.NOT_BELIEVED] * 2 + [progress.BEGUN_ANEW]
     assert on.now(leap_s).status == progress.NOT_STARTED

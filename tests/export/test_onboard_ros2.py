@@ -128,7 +128,7 @@ def test_its_odometry_is_what_python_says_of_the_same_readings(said):
         board.take(heard)
         if given.sensor == Sensor.IMU:
             now = board.now(heard.t_s)
-            if now.status == progress.TOLD:
+            if now.status == progress.STATE_GIVEN:
                 expected[stamp_ns(given)] = now
     rows = [line for line in said if line[0] == "~/odometry"]
     assert len(rows) > 300

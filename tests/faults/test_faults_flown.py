@@ -19,7 +19,7 @@ from flownav.navigation.records import Reading
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_written
-from flownav.simulation.failing import FaultNormals, failed, strikes
+from flownav.simulation.fault_injection import FaultNormals, failed, strikes
 from flownav.simulation.truth import SOUND
 
 BY_CHANCE = ("flow_garbage", "low_texture", "low_texture_unsaid", "range_spikes", "accel_vibration")
@@ -140,7 +140,7 @@ def test_a_jump_of_gps_is_noticed_and_the_pad_stays_where_flow_has_it(rows, flow
 
 def test_flow_of_the_wrong_sign_is_told_or_the_vehicle_is_down_before_it_is_far(rows, flown):
     """A vehicle that hardly moves shows the sign late: one in some 400 has landed by then, no further off than GPS."""
-    untold = [flight for flight in flown["flow_sign", 20.0].flights if flight.said_s is None]
+    untold = [flight for flight in flown["flow_sign", 20.0].flights if flight.warned_s is None]
     assert len(untold) <= 1
     assert all(flight.verdict == "landed" and flight.largest_m < GPS_M for flight in untold)
     row = rows["flow_sign", 20.0]

@@ -174,7 +174,7 @@ def test_the_cost_is_the_time_with_faults_followed_by_that_without(setup, monkey
     monkeypatch.setattr(integrity, "run", lambda queue, on: followed.append(int(on.work[HYPOTHESES])))
     ticks = iter(np.cumsum([0.0, 3.0, 0.0, 2.0] * 3))  # 3 s with, 2 s without
     monkeypatch.setattr(integrity.time, "perf_counter", lambda: next(ticks))
-    assert cost(setup.fitted.told, flight_at(0.5, 1.0, 3).streams, repeats=3) == pytest.approx(1.5)
+    assert cost(setup.fitted.given, flight_at(0.5, 1.0, 3).streams, repeats=3) == pytest.approx(1.5)
     assert followed == [MOST_HYPOTHESES, 0] * 3
 
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from flownav.core.compiling import beside
+from flownav.core.compiling import parallel
 from flownav.core.compiling.cache import SUFFIX, Store, cache_folder
 
 HUNG_S = 900.0  # whoever compiles for so long hangs, and is not waited for any more
@@ -54,7 +54,7 @@ def begin() -> None:
     """From now on, this process compiles nothing that another one is compiling."""
     turns = Turns()
     load, save = Store.load, Store.save
-    are_missing, compiling = beside._are_both_missing, beside._compiling_elsewhere
+    are_missing, compiling = parallel._are_both_missing, parallel._compiling_elsewhere
 
     def load_or_wait(self: Store, name: str) -> bytes | None:
         found = load(self, name)
@@ -69,7 +69,7 @@ def begin() -> None:
         turns.give(name)
 
     def are_missing_still(*asked: Any) -> bool:
-        if not are_missing(*asked) or not beside.can_pay():
+        if not are_missing(*asked) or not parallel.can_pay():
             return False
         turns.take("beside")
         if still := are_missing(*asked):
@@ -86,4 +86,4 @@ def begin() -> None:
             turns.give("beside")
 
     Store.load, Store.save = load_or_wait, save_and_give
-    beside._are_both_missing, beside._compiling_elsewhere = are_missing_still, compiling_and_give
+    parallel._are_both_missing, parallel._compiling_elsewhere = are_missing_still, compiling_and_give

@@ -14,7 +14,7 @@ import llvmlite.binding as llvm
 import numpy as np
 
 from flownav.core.compiling.device import call_instead, lowered
-from flownav.core.compiling.launch import argument_type, flattened, per_thread, told_names, with_arrays
+from flownav.core.compiling.launch import argument_names, argument_type, flattened, per_thread, with_arrays
 
 CAPABILITY = (9, 0)
 INTRINSICS = {name: name for name in ("sqrt", "fabs", "floor", "ceil", "rint", "trunc")} | {
@@ -52,7 +52,7 @@ class HostedDevice:
 
     def run(self, function: Any, threads: int, told: dict[str, Any], constants: dict[str, Any]) -> None:
         """`function(thread, threads, **told, **constants)` for each thread."""
-        arguments = (threads, *(told[name] for name in told_names(function, constants)))
+        arguments = (threads, *(told[name] for name in argument_names(function, constants)))
         passed = list(flattened(arguments, lambda array: array.ctypes.data))
         entry, thread = self._entry(function, constants, arguments, passed)
         for k in range(threads):

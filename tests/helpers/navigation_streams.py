@@ -14,11 +14,11 @@ from flownav.estimation.covariance import variance_of
 from flownav.estimation.gating import Reason
 from flownav.estimation.states import STATE
 from flownav.navigation.feed import equipment_of
+from flownav.navigation.kernel_settings import NO_STATED_NOISE, Equipment, FlowNoise
 from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.rows import EXTRA_STATES, EstimateRow, EventRow, InnovationRow
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tape import EVENT_NAMES, new_tape
-from flownav.navigation.told import NO_STATED_NOISE, Equipment, FlowNoise
 
 FIELD_GAUSS = np.array([0.21, 0.0, 0.43])
 Path = Callable[[np.ndarray], np.ndarray]
@@ -115,10 +115,10 @@ class Navigated:
 
     @property
     def t_s(self) -> np.ndarray:
-        return self.said.t_s
+        return self.estimate_rows.t_s
 
     @property
-    def said(self) -> EstimateRow[np.ndarray]:
+    def estimate_rows(self) -> EstimateRow[np.ndarray]:
         return EstimateRow.of(self.estimate)
 
     @property
@@ -135,15 +135,15 @@ class Navigated:
 
     @property
     def error(self) -> np.ndarray:
-        return self.said.pos_ned_m - self.flown.at(self.t_s, self.flown.position)
+        return self.estimate_rows.pos_ned_m - self.flown.at(self.t_s, self.flown.position)
 
     @property
     def velocity_error(self) -> np.ndarray:
-        return self.said.vel_ned_m_s - self.flown.at(self.t_s, self.flown.velocity)
+        return self.estimate_rows.vel_ned_m_s - self.flown.at(self.t_s, self.flown.velocity)
 
     @property
     def yaw_error(self) -> np.ndarray:
-        w, x, y, z = self.said.quaternion.T
+        w, x, y, z = self.estimate_rows.quaternion.T
         yaw = np.arctan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
         difference = yaw - np.interp(self.t_s, self.flown.t_s, self.flown.yaw)
         return np.arctan2(np.sin(difference), np.cos(difference))
@@ -151,7 +151,7 @@ class Navigated:
     def column(self, state: int, count: int = 1) -> np.ndarray:
         """States from GYRO_BIAS on, as the estimates have them, (n, count)."""
         first = EXTRA_STATES.index(state)
-        return self.said.states[:, first : first + count]
+        return self.estimate_rows.states[:, first : first + count]
 
     def state(self, index: int) -> float:
         return float(self.on.work[STATE + index])

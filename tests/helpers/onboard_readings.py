@@ -13,9 +13,9 @@ from flownav.export.onboard.interface import Rates
 from flownav.export.onboard.package import Flight, pace_of, packed_settings
 from flownav.logs.log import FedSegment, mean_over
 from flownav.navigation import progress
+from flownav.navigation.kernel_settings import NO_STATED_NOISE, FlowNoise
 from flownav.navigation.rings import Given, numbers_of
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
 from navigation_streams import Flown, equipment
 
 RATES = Rates(0.27, 100.0, 150.0, 0.0, 0.05)

@@ -317,7 +317,7 @@ def options_of(setup: Any, baud: int) -> Options:
     return Options(
         gps_delay_s=float(ages_s[Sensor.GPS_POSITION]),
         identified=IdentifiedFlow(1.0, 1.0, float(ages_s[Sensor.FLOW_RATE])),
-        settings=setup.fitted.told.settings,
-        flow_noise=setup.fitted.told.noise,
+        settings=setup.fitted.given.settings,
+        flow_noise=setup.fitted.given.noise,
         capacity_bytes_s=baud / 10,
     )

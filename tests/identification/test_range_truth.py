@@ -57,7 +57,7 @@ def test_the_second_is_named_and_the_gains_are_of_the_true_part(flown, change, w
 def test_a_range_that_is_true_has_nothing_said_of_it(flown):
     log = read_csv_folder(changed(flown, lambda range_m: range_m))
     flying = np.ones(len(log.streams[Sensor.RANGE]), bool)
-    assert untrue(log, flying).said == ()
+    assert untrue(log, flying).notes == ()
     assert not untrue(log, flying).flags.any()
 
 
@@ -84,10 +84,10 @@ def test_a_barometer_names_the_seconds_unless_it_has_drifted(tmp_path, drift_m, 
                Stream.of(Sensor.ATTITUDE, t_s, level)]  # fmt: skip
     alone = replace(log, streams={stream.sensor: stream for stream in streams}, truth=None)
     found = untrue(alone, np.ones(len(t_s), bool))
-    assert bool(found.said) == named
+    assert bool(found.notes) == named
     assert not found.flags.any()
     if named:
-        assert "of the height of the barometer" in found.said[0]
+        assert "of the height of the barometer" in found.notes[0]
 
 
 def test_a_hover_that_a_truth_confirms_is_no_range_that_stands_still(tmp_path):
@@ -105,5 +105,5 @@ def test_a_hover_that_a_truth_confirms_is_no_range_that_stands_still(tmp_path):
         alone = replace(log, streams={stream.sensor: stream for stream in streams}, truth=truth)
         return untrue(alone, np.ones(len(t_s), bool))
 
-    assert found(height).said == ()
-    assert "it repeats 5.20 m" in found(stuck).said[0]
+    assert found(height).notes == ()
+    assert "it repeats 5.20 m" in found(stuck).notes[0]

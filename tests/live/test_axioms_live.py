@@ -27,6 +27,7 @@ from flownav.live.vehicle_clock import COARSE_S, FRESH_S, VehicleClock
 from flownav.live.vehicle_clock import WINDOW_S as LEADS_S
 from flownav.live.writing import HEAD_EVERY_S, LOCK_WAIT_S, SYNC_S, Writer, claim, is_locked, journal_of
 from flownav.navigation import waiting
+from flownav.navigation.kernel_settings import NO_HEADING, Equipment
 from flownav.navigation.loop import start_navigator
 from flownav.navigation.memory import CLOCK, MEMORY, PROTECTION
 from flownav.navigation.motion_records import ImuMemory
@@ -34,7 +35,6 @@ from flownav.navigation.records import AidMemory, StartMemory
 from flownav.navigation.rings import Given, Rings, numbers_of
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tape import empty_tape
-from flownav.navigation.told import NO_HEADING, Equipment
 from mavlink_logs import made
 from packed_covariance import pack
 
@@ -48,9 +48,9 @@ def test_a_lag_is_remembered_for_three_to_four_windows_and_then_forgotten(start_
         lags, forgotten_s = Lags(), None
         for k in range(400):
             t_s = start_s + 0.1 * k
-            lags.heard(Sensor.IMU, t_s)
+            lags.received(Sensor.IMU, t_s)
             late = abs(0.1 * k - late_at_s) < 0.04
-            lags.heard(Sensor.RANGE, t_s - (0.5 if late else 0.1))
+            lags.received(Sensor.RANGE, t_s - (0.5 if late else 0.1))
             if 0.1 * k > late_at_s + 0.05 and lags.by_sensor[Sensor.RANGE] < 0.4 and forgotten_s is None:
                 forgotten_s = 0.1 * k - late_at_s
         assert forgotten_s is not None
@@ -61,9 +61,9 @@ def test_a_lag_is_remembered_for_three_to_four_windows_and_then_forgotten(start_
 def test_one_that_falls_silent_is_waited_for_as_long_and_no_longer(start_s):
     lags, waited_s = Lags(), 0.0
     for k in range(400):
-        lags.heard(Sensor.IMU, start_s + 0.1 * k)
+        lags.received(Sensor.IMU, start_s + 0.1 * k)
         if k < 30:
-            lags.heard(Sensor.RANGE, start_s + 0.1 * k - 0.4)
+            lags.received(Sensor.RANGE, start_s + 0.1 * k - 0.4)
         elif Sensor.RANGE in lags.by_sensor:
             waited_s = 0.1 * k - 3.0
             assert lags.horizon_s(0.1, 0.05, 1.0) == pytest.approx(0.45)
@@ -74,8 +74,8 @@ def test_one_that_falls_silent_is_waited_for_as_long_and_no_longer(start_s):
 def test_a_lag_as_long_as_is_waited_for_counts_and_a_longer_one_does_not():
     for lag_s, counts in ((0.99, True), (1.01, False)):
         lags = Lags(most_s=1.0)
-        lags.heard(Sensor.IMU, 50.0)
-        lags.heard(Sensor.RANGE, 50.0 - lag_s)
+        lags.received(Sensor.IMU, 50.0)
+        lags.received(Sensor.RANGE, 50.0 - lag_s)
         assert (lags.by_sensor.get(Sensor.RANGE, 0.0) == pytest.approx(lag_s)) is counts
         assert lags.newest_s == 50.0
 
@@ -285,8 +285,8 @@ def test_a_place_is_the_same_in_the_navigator_s_frame_and_in_the_autopilot_s(tol
     """The origin that is sent later, north, east and higher or lower: with the offset it is one spot of the earth."""
     origin, fix = Origin(), (25.0, 55.0, 10.0)
     assert origin.fixed(fix) == ""
-    assert origin.told(told) == "moved"
-    assert origin.told(told) == ""  # again: nothing moves
+    assert origin.received(told) == "moved"
+    assert origin.received(told) == ""  # again: nothing moves
     for here in ((0.0, 0.0, 0.0), (12.0, -7.0, -3.0)):
         there = np.add(here, origin.offset_ned_m)
         ours, theirs = pymap3d.ned2geodetic(*here, *fix), pymap3d.ned2geodetic(*there, *told)

@@ -152,7 +152,7 @@ def test_one_alone_stays_whatever_it_tells():
 def test_who_tells_all_stays_though_another_has_a_better_name():
     autopilots = heard((1, 1, GENERIC), (2, 1, ARDUPILOT))
     for number in (MOVES, PLACES):
-        autopilots.told((1, 1), number)
+        autopilots.received((1, 1), number)
     assert all(autopilots.better((1, 1), now_s) is None for now_s in range(100))
 
 
@@ -160,7 +160,7 @@ def test_who_tells_all_is_taken_from_one_that_tells_nothing():
     autopilots = heard((2, 1, ARDUPILOT), (1, 1, GENERIC))
     assert autopilots.better((2, 1), 0.0) is None
     for number in (MOVES, PLACES):
-        autopilots.told((1, 1), number)
+        autopilots.received((1, 1), number)
     assert autopilots.better((2, 1), 0.1).who == (1, 1)
 
 
@@ -168,13 +168,13 @@ def test_whose_turn_is_over_does_not_come_back_while_another_tells_more():
     autopilots = heard((2, 1, ARDUPILOT), (1, 1, ARDUPILOT))
     assert autopilots.better((2, 1), 0.0) is None
     assert autopilots.better((2, 1), TURN_S + 0.1).who == (1, 1)
-    autopilots.told((1, 1), MOVES)
+    autopilots.received((1, 1), MOVES)
     assert all(autopilots.better((1, 1), TURN_S + 0.2 + now_s) is None for now_s in range(100))
 
 
 def test_many_strangers_are_not_remembered_without_end():
     autopilots = heard(*((system, 1, ARDUPILOT) for system in range(1, 250)))
-    assert len(autopilots.heard) == 64
+    assert len(autopilots.candidates) == 64
 
 
 def test_the_vehicle_that_hovers_is_found_as_before():

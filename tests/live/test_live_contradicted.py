@@ -141,7 +141,7 @@ def test_an_origin_of_another_town_and_a_gimbal_move_nothing(square):
     found = square(both, 100.0)
     assert worst_m(found) < UNDISTURBED_M + 0.1
     assert silent_s(found, SINCE_S + 7.0, 99.5) < 0.3
-    assert found.session.hearing.origin.as_facts()["doubted"]
+    assert found.session.intake.origin.as_facts()["doubted"]
     assert len(set(found.resets)) == 1
 
 

@@ -31,7 +31,7 @@ def test_the_heading_does_not_follow_what_ekf2_has_learnt(data_folder, name, unt
     assert np.hypot(*found.error_m[:, :2].T).max() < 1.0
     assert np.abs(found.error_m[:, 2]).max() < 1.0
     assert found.longest_gap_s(0.0) < 1.0
-    assert found.session.hearing.field.comparable
+    assert found.session.intake.field.comparable
 
 
 FOLLOWS_S = NOISE_GAUSS / CREEPS / math.sqrt(15.0)  # the time constant of its bias, at the magnetometer's rate

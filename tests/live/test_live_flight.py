@@ -72,7 +72,7 @@ def simulated():
     """The flight of pad_return as a log, and the session's options."""
     warm_up()
     setup = assemble(load_scenario("pad_return"))
-    told, ages_s = setup.fitted.told, setup.fitted.ages_s
+    told, ages_s = setup.fitted.given, setup.fitted.ages_s
     options = Options(
         gps_delay_s=float(ages_s[Sensor.GPS_POSITION]),
         identified=IdentifiedFlow(1.0, 1.0, float(ages_s[Sensor.FLOW_RATE])),

@@ -45,8 +45,8 @@ def flown(inertial, until_s, force=lambda t_s: LEVEL, second=None, since_s=0.0, 
     for k in range(round((until_s - since_s) * 100)):
         t_s = since_s + 0.01 * k
         if second is not None and k % 2 == 0:
-            inertial.heard(SECOND, reading(t_s, second(t_s)), FIRST)
-        swap = inertial.heard(FIRST, reading(t_s, force(t_s), chance.gauss(0.0, 0.01)), FIRST)
+            inertial.received(SECOND, reading(t_s, second(t_s)), FIRST)
+        swap = inertial.received(FIRST, reading(t_s, force(t_s), chance.gauss(0.0, 0.01)), FIRST)
         if swap is not None:
             return t_s, swap
     return None
@@ -109,11 +109,11 @@ def test_it_is_believed_again_once_it_is_not_stuck_any_more():
     force = stuck_from(1.0)
     flown(inertial, 3.0, force)
     for k in range(200):
-        inertial.heard(FIRST, reading(1.2 + 0.01 * k, (3.0, 3.0, 3.0), 0.01 * (k % 7)), None)
+        inertial.received(FIRST, reading(1.2 + 0.01 * k, (3.0, 3.0, 3.0), 0.01 * (k % 7)), None)
     assert not inertial.recovered(FIRST, 3.2, alone=True)
     usual = shaken(7)
     for k in range(100):
-        inertial.heard(FIRST, reading(3.2 + 0.01 * k, usual(0.0), 0.01 * (k % 7)), None)
+        inertial.received(FIRST, reading(3.2 + 0.01 * k, usual(0.0), 0.01 * (k % 7)), None)
     assert inertial.recovered(FIRST, 3.2 + RECOVERED_S + 0.05, alone=True)
 
 
@@ -124,7 +124,7 @@ def test_a_stuck_one_whose_last_digit_flickers_stays_stuck():
         return (3.0, 3.0, 3.0 + 0.01 * (round(100 * t_s) // 9 % 2)) if t_s >= 1.0 else usual(t_s)
 
     for k in range(300):
-        inertial.heard(FIRST, reading(0.01 * k, flickers(0.01 * k), 0.01 * (k % 7)), None)
+        inertial.received(FIRST, reading(0.01 * k, flickers(0.01 * k), 0.01 * (k % 7)), None)
         assert k < 110 or not inertial.recovered(FIRST, 0.01 * k, alone=True)
 
 
@@ -133,7 +133,7 @@ def test_one_that_comes_back_to_what_it_said_before_is_not_stuck_there():
     inertial = Inertial()
     for k in range(500):
         force = (3.0, 3.0, 3.0) if 100 <= k < 200 else (0.0, 0.0, -9.81 + 0.01 * (k // 50 % 2))
-        inertial.heard(FIRST, reading(0.01 * k, force, 0.01 * (k % 7)), None)
+        inertial.received(FIRST, reading(0.01 * k, force, 0.01 * (k % 7)), None)
     assert inertial.recovered(FIRST, 2.0 + RECOVERED_S + 0.05, alone=True)
 
 
@@ -146,9 +146,9 @@ def test_of_three_the_one_that_is_alone_errs_whatever_gravity_says():
         falls = 5.0 if t_s >= 1.0 else 0.0
         force = [(x, y, z + falls) for x, y, z in (one(t_s) for one in chance)]
         wrong = (force[0][0], force[0][1], force[0][2] - falls)
-        inertial.heard(SECOND, reading(t_s, force[1]), FIRST)
-        inertial.heard(third, reading(t_s, force[2]), FIRST)
-        swap = inertial.heard(FIRST, reading(t_s, wrong), FIRST)
+        inertial.received(SECOND, reading(t_s, force[1]), FIRST)
+        inertial.received(third, reading(t_s, force[2]), FIRST)
+        swap = inertial.received(FIRST, reading(t_s, wrong), FIRST)
         if swap is not None:
             break
     assert 1.0 <= t_s < 1.15
@@ -161,8 +161,8 @@ def test_one_that_was_contradicted_is_believed_again_when_it_agrees():
     assert flown(inertial, 3.0, lambda t_s: (0.0, 0.0, -5.0 if t_s >= 1.0 else -9.81), second=usual) is not None
     for k in range(300):
         t_s = 1.2 + 0.01 * k
-        inertial.heard(FIRST, reading(t_s, (0.0, 0.0, -5.0 if t_s < 2.0 else -9.81)), SECOND, {FIRST})
-        inertial.heard(SECOND, reading(t_s, usual(t_s)), SECOND, {FIRST})
+        inertial.received(FIRST, reading(t_s, (0.0, 0.0, -5.0 if t_s < 2.0 else -9.81)), SECOND, {FIRST})
+        inertial.received(SECOND, reading(t_s, usual(t_s)), SECOND, {FIRST})
         if t_s < 2.0 + 0.5 * AGREED_S:
             assert not inertial.recovered(FIRST, t_s, alone=False)
     assert inertial.recovered(FIRST, 2.0 + AGREED_S + 0.15, alone=False)
@@ -204,10 +204,10 @@ def test_a_flood_of_readings_costs_no_more_than_a_second_of_an_ordinary_sensor()
     inertial, chance = Inertial(), random.Random(8)
     for k in range(20_000):
         t_s = 5e-5 * k
-        inertial.heard(FIRST, reading(t_s, (chance.gauss(0.0, 0.1), 0.0, -9.81)), FIRST)
+        inertial.received(FIRST, reading(t_s, (chance.gauss(0.0, 0.1), 0.0, -9.81)), FIRST)
         if k % 400 == 0:
-            inertial.heard(SECOND, reading(t_s), FIRST)
-    flooded = inertial._heard[FIRST]
+            inertial.received(SECOND, reading(t_s), FIRST)
+    flooded = inertial._histories[FIRST]
     assert len(flooded.kept) == MOST_KEPT
     looked = flooded.usual(t_s)
     assert looked.by_chance == pytest.approx(0.1 / math.sqrt(MOST_COMPARED), rel=0.5)
@@ -254,7 +254,7 @@ def test_another_flies_on_while_the_first_is_stuck_however_the_vehicle_jolts(veh
     assert max(heights) - min(heights) < 0.5
     assert max(b - a for (a, _), (b, _) in pairwise(told)) < 0.2
     assert wire.session.resets == 1
-    assert not wire.session.hearing.sources.barred[Sensor.IMU]
+    assert not wire.session.intake.sources.barred[Sensor.IMU]
     wire.close()
 
 
@@ -272,7 +272,7 @@ def test_six_zeros_of_highres_imu_are_no_reading():
     heights = [m.z for _, m in told]
     assert max(heights) - min(heights) < 0.5
     assert max(b - a for (a, _), (b, _) in pairwise(told)) < 0.2
-    assert wire.session.hearing.counts["imu: no_data"] == round((WELL_S - STUCK_S) * 100)
+    assert wire.session.intake.counts["imu: no_data"] == round((WELL_S - STUCK_S) * 100)
     wire.close()
 
 

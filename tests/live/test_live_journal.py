@@ -118,13 +118,13 @@ def test_rows_of_a_navigator_that_is_lost_are_left_out(tmp_path, turns):
     recorder.leave()
     wire.close()
     data = recorder.journal.read_bytes()
-    first = next(part for part in blocks(memoryview(data)) if isinstance(part, Block) and "segments" in part.said)
+    first = next(part for part in blocks(memoryview(data)) if isinstance(part, Block) and "segments" in part.stated)
     spoilt = bytearray(data)
     spoilt[data.find(b'"segments": [[0, ')] ^= 1
     recorder.journal.write_bytes(bytes(spoilt))
     found = recovered(recorder.journal)
     assert found.lost_blocks == 1
-    assert first.said["segments"][0][0] == 0
+    assert first.stated["segments"][0][0] == 0
     assert len(found.record.manifest["segments"]) == 1
     assert set(found.record.tables["fed"]["segment"]) == {0.0}
     found.record.save(tmp_path / "restart.fnr")
@@ -169,7 +169,11 @@ def test_the_journal_of_a_killed_run_is_never_touched(journal):
         recorder = Recorder(path, Options(), force=force)
         assert recorder.path.name == name
         assert f"`flownav recover {journal}`" in recorder.notice
-        assert recorder.finish({}, heard=False).facts() == {"record": None, "journal": None, "recording_stopped": None}
+        assert recorder.finish({}, received=False).facts() == {
+            "record": None,
+            "journal": None,
+            "recording_stopped": None,
+        }
     assert journal.read_bytes() == before
 
 

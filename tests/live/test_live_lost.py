@@ -31,7 +31,7 @@ def test_a_vehicle_without_gps_is_sent_an_estimate_within_seconds(played):
     assert found.t_s[0] - 17.8 < 5.0  # the vehicle's time when it is first received
     assert found.longest_gap_s(0.0) < 0.2
     assert np.abs(found.error_m).max() < 0.15
-    assert not found.session.hearing.gps_heard
+    assert not found.session.intake.gps_received
 
 
 def test_flow_that_cannot_be_believed_is_said_and_its_end_is_a_counted_reset(played):
@@ -123,4 +123,4 @@ def test_the_heading_holds_without_gps(played):
     assert np.hypot(*found.error_m[flying, :2].T).max() < 1.0
     assert found.longest_gap_s(0.0) < 0.3
     assert found.session.dropped["link: lost"] < 10  # frames of messages that nobody knows are not lost
-    assert found.session.hearing.readings[Sensor.MAG] > 500
+    assert found.session.intake.readings[Sensor.MAG] > 500

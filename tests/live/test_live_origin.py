@@ -55,7 +55,7 @@ def test_one_message_in_flight_moves_nothing(north_m):
     assert len(wire.estimates(6.0)) > 100
     assert jumps(wire, 5.0) < 0.2
     assert wire.session.resets == hovering(6).session.resets
-    assert wire.session.hearing.origin.as_facts()["doubted"] == pytest.approx(north_of(ORIGIN, north_m), abs=1e-3)
+    assert wire.session.intake.origin.as_facts()["doubted"] == pytest.approx(north_of(ORIGIN, north_m), abs=1e-3)
     asked = [m for m in wire.heard if m.msgname == "COMMAND_LONG" and m.param1 == 32]
     assert asked, "where the autopilot is in it"
 
@@ -72,7 +72,7 @@ def test_where_the_autopilot_stands_in_its_old_frame_it_is_refused():
     wire = hovering(6)
     wire.send(origin_message(wire, north_of(ORIGIN, 5000.0)))
     wire.fly(4.0, beside=stands(wire, ORIGIN))
-    origin = wire.session.hearing.origin
+    origin = wire.session.intake.origin
     assert (origin.refused, origin.moves, origin.doubted) == (1, 0, None)
     assert wire.session.dropped["origin: refused"] == 1
     assert jumps(wire, 5.0) < 0.2
@@ -114,15 +114,15 @@ def settled():
 
 
 def test_near_ones_are_followed_at_once():
-    assert settled().told(north_of(ORIGIN, 0.9 * STEP_M), settled=True) == "moved"
-    assert settled().told(north_of(ORIGIN, 0.9 * FAR_M)) == "moved"
-    assert settled().told(north_of(ORIGIN, 1.1 * FAR_M)) == "doubted"
-    assert settled().told(north_of(ORIGIN, 1.1 * STEP_M), settled=True) == "doubted"
+    assert settled().received(north_of(ORIGIN, 0.9 * STEP_M), settled=True) == "moved"
+    assert settled().received(north_of(ORIGIN, 0.9 * FAR_M)) == "moved"
+    assert settled().received(north_of(ORIGIN, 1.1 * FAR_M)) == "doubted"
+    assert settled().received(north_of(ORIGIN, 1.1 * STEP_M), settled=True) == "doubted"
 
 
 def test_positions_that_contradict_each_other_decide_nothing():
     origin = settled()
-    origin.told(north_of(ORIGIN, 400.0), settled=True)
+    origin.received(north_of(ORIGIN, 400.0), settled=True)
     for _ in range(3):
         for north_m in (0.0, 0.0, -400.0, -400.0, -200.0):
             assert origin.stands((north_m, 0.0, 0.0)) == ""
@@ -130,7 +130,7 @@ def test_positions_that_contradict_each_other_decide_nothing():
 
 def test_as_many_in_a_row_as_are_needed_decide():
     origin = settled()
-    origin.told(north_of(ORIGIN, 400.0), settled=True)
+    origin.received(north_of(ORIGIN, 400.0), settled=True)
     said = [origin.stands((-400.0, 0.0, 0.0)) for _ in range(AGREEMENTS)]
     assert said == [""] * (AGREEMENTS - 1) + ["moved"]
     assert origin.stands((-400.0, 0.0, 0.0)) == ""
@@ -139,14 +139,14 @@ def test_as_many_in_a_row_as_are_needed_decide():
 
 def test_the_one_in_use_told_again_ends_the_doubt():
     origin = settled()
-    origin.told(north_of(ORIGIN, 400.0), settled=True)
-    assert origin.told(ORIGIN, settled=True) == ""
+    origin.received(north_of(ORIGIN, 400.0), settled=True)
+    assert origin.received(ORIGIN, settled=True) == ""
     assert origin.doubted is None
 
 
 def test_a_first_fix_in_flight_far_from_what_was_told_is_doubted_too():
     origin = Origin()
-    origin.told(north_of(ORIGIN, 5000.0))
+    origin.received(north_of(ORIGIN, 5000.0))
     assert origin.fixed(ORIGIN, (7.0, 0.0, -3.0)) == "doubted"
     assert origin.navigator_deg_m == pytest.approx(north_of(ORIGIN, -7.0, -3.0), abs=1e-3)
     assert origin.offset_ned_m == HERE

@@ -203,7 +203,7 @@ def test_the_estimate_of_now_is_where_the_filter_will_be_when_it_gets_there():
     filtering = Filtering(Options(), Keeper())
     for reading in [attitude, *(imu(0.01 * k) for k in range(100)), fix]:
         assert filtering.rings.take(reading) == waiting.TAKEN
-    filtering.begin(gps_heard=True)
+    filtering.begin(gps_received=True)
     for readings in (BATCH_READINGS, 102 - BATCH_READINGS, 0):
         assert filtering.feed(0.999).readings == readings
     for k in range(30):

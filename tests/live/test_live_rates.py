@@ -92,17 +92,17 @@ def test_a_line_that_others_fill_is_asked_for_less():
     now_s, asked_again = 0.0, 0
     while now_s < 3.0 * LOOK_S:
         now_s += 0.1
-        if rates.heard(1140, now_s):  # 99 % of the line
+        if rates.received(1140, now_s):  # 99 % of the line
             asked_again += 1
             assert bytes_of(rates.begin(ARDUPILOT), ardupilot=True) < before
     assert asked_again == 2
     unsettled = Rates(11_520.0, "odometry", signed=False)
     unsettled.begin(ARDUPILOT)
-    assert not any(unsettled.heard(1140, 0.1 * step, settled=False) for step in range(300))
+    assert not any(unsettled.received(1140, 0.1 * step, settled=False) for step in range(300))
     quiet = Rates(11_520.0, "odometry", signed=False)
     quiet.begin(ARDUPILOT)
-    assert not any(quiet.heard(900, 0.1 * step) for step in range(300))
-    assert not Rates(None, "odometry", signed=False).heard(10**9, 1.0)
+    assert not any(quiet.received(900, 0.1 * step) for step in range(300))
+    assert not Rates(None, "odometry", signed=False).received(10**9, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -277,7 +277,7 @@ def test_on_a_slow_link_estimates_come_as_often_as_it_carries(wires):
     wire = wires(capacity_bytes_s=5_760.0).fly(10.0)
     found = wire.estimates(5.0)
     assert 15.0 <= len(found) / 5.0 <= 19.0
-    assert wire.session.hearing.flow_waited > 100
+    assert wire.session.intake.flow_waited > 100
     newest = [message.time_usec for message in found]
     assert newest == sorted(newest)
     fast = wires().fly(10.0)

@@ -74,13 +74,13 @@ def rms_m(sent, truth):
 def test_gps_is_fused_whatever_its_phase_to_the_stream(link, shift_s):
     """A 5 Hz fix repeated at 10 Hz: its first copy is up to 100 ms old. With a fixed 0.27 s all were late."""
     session, sent = play(delayed(link("square", 20.0), GPS_RAW_INT, shift_s))
-    fixes = session.hearing.readings[Sensor.GPS_POSITION]
+    fixes = session.intake.readings[Sensor.GPS_POSITION]
     assert fixes > 50
     assert session.dropped["gps_position: repeated"] == pytest.approx(fixes, abs=2)
     assert session.dropped.get("gps_position: late", 0) <= 2  # until the horizon has followed
     assert not session.alarms
     assert session.reason == ""
-    assert session.hearing.horizon_s < 0.45
+    assert session.intake.horizon_s < 0.45
     assert longest_gap_s(sent, began_s(sent)) < 0.1
     assert longest_gap_s(sent) < 0.5  # where it is begun anew with GPS, on the ground
 
@@ -88,8 +88,8 @@ def test_gps_is_fused_whatever_its_phase_to_the_stream(link, shift_s):
 @pytest.mark.parametrize("period_s", [0.1, 0.2])
 def test_a_link_that_delivers_in_batches_loses_nothing(link, period_s):
     session, sent = play(batched(link("square", 20.0), period_s))
-    assert session.hearing.readings[Sensor.GPS_POSITION] > 50
-    assert session.hearing.readings[Sensor.FLOW_RATE] > 900
+    assert session.intake.readings[Sensor.GPS_POSITION] > 50
+    assert session.intake.readings[Sensor.FLOW_RATE] > 900
     assert not [name for name in session.dropped if name.endswith(": late")]
     assert session.reason == ""
     assert longest_gap_s(sent, began_s(sent)) < period_s + 0.1
@@ -159,7 +159,7 @@ def test_a_timesync_that_lies_does_not_stop_the_sending(link):
     assert session.reason == ""
     assert longest_gap_s(sent, began_s(sent)) < 0.1
     stamps = [message.time_usec * 1e-6 for _, message in sent_of(sent, "ODOMETRY")]
-    assert max(stamps) < session.hearing.newest_s + 0.1
+    assert max(stamps) < session.intake.newest_s + 0.1
 
 
 def test_after_a_reboot_the_streams_are_asked_for_again(rebooted):
@@ -181,8 +181,8 @@ def test_the_origin_that_the_autopilot_sets_later_is_followed(link):
     told = sent_of(sent, "ODOMETRY")
     before = [message for now_s, message in told if now_s < moved_s][-1]
     after = next(message for now_s, message in told if now_s > moved_s + 0.05)
-    assert session.hearing.origin.moves == 1
-    assert session.hearing.origin.offset_ned_m[0] == pytest.approx(-2.21, abs=0.01)
+    assert session.intake.origin.moves == 1
+    assert session.intake.origin.offset_ned_m[0] == pytest.approx(-2.21, abs=0.01)
     assert after.x - before.x == pytest.approx(-2.21, abs=0.1)
     assert (after.reset_counter - before.reset_counter) % 256 == 1
     assert abs(told[-1][1].x) < 1.0  # the vehicle stands on it; 1.6 m off where the first fix stayed the origin
@@ -196,7 +196,7 @@ def test_an_origin_on_the_other_side_of_the_country_is_refused(link):
     late = sorted([*frames, Arrival(frames[0].now_s + 12.0, far)], key=lambda arrival: arrival.now_s)
     for played in (sorted(early, key=lambda arrival: arrival.now_s), late):
         session, sent = play(played)
-        assert session.hearing.origin.refused == 1
-        assert session.hearing.origin.moves == 0
+        assert session.intake.origin.refused == 1
+        assert session.intake.origin.moves == 0
         assert session.dropped["origin: refused"] == 1
         assert all(abs(message.x) < 5.0 for _, message in sent_of(sent, "ODOMETRY"))

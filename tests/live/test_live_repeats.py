@@ -83,6 +83,6 @@ def test_on_the_link_to_ardupilot_flow_is_fused_as_often_as_it_is_measured(data_
     frames = arrivals(data_folder / "ardupilot-live" / "flow-noise-silence", 75.0)
     session, _ = play(frames)
     dropped = session.dropped["flow_rate: repeated"]
-    read = session.hearing.readings[Sensor.FLOW_RATE]
+    read = session.intake.readings[Sensor.FLOW_RATE]
     assert read + dropped == pytest.approx(50.0 * (frames[-1].now_s - frames[0].now_s), rel=0.2)
     assert 3.5 < dropped / read < 4.2

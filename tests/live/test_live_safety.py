@@ -19,8 +19,8 @@ from flownav.estimation.states import POSITION, STATE
 from flownav.live.answers import why_withheld
 from flownav.live.display import draw
 from flownav.live.filtering import ROOM, Keeper
-from flownav.live.hearing import WALKS
 from flownav.live.horizon import Refused
+from flownav.live.intake import WALKS
 from flownav.live.loop import Latency
 from flownav.live.options import Limits, Options
 from flownav.live.reception import BESIDE, Accepted, accepted_by, accepted_of
@@ -318,7 +318,7 @@ def shown(wire):
 def test_while_a_fault_is_suspected_nothing_is_sent_and_the_screen_names_it():
     """GPS drifts north at 1 m/s; flow, IMU and the receiver's own velocity say that the vehicle hovers."""
     wire, told = hovering(12), {}
-    wire.session.hearing.walking.take = lambda place, velocity: False  # or its place is refused before
+    wire.session.intake.walking.take = lambda place, velocity: False  # or its place is refused before
 
     def drift():
         wire.vehicle.north_m += 0.01
@@ -538,7 +538,7 @@ def test_a_recorded_link_played_into_a_fresh_session_is_not_heard_beyond_the_pro
     for number, frame in enumerate(recorded):
         session.take(frame, START_S + 1e-3 * number, whole=True)
     assert (session.reception.vehicle is not None) is heard
-    assert bool(session.hearing.readings) is heard
+    assert bool(session.intake.readings) is heard
 
 
 # -- what a reviewer broke ---------------------------------------------------------------------------------
@@ -637,7 +637,7 @@ def test_alarms_that_ended_are_kept(wires):
 
     wire = wires(limits=Limits(unfused_s=2.0)).fly(6.0)
     spell = Refused(1.0, 4.0, 20, "late")
-    wire.session.hearing.serving._spells[Sensor.POSE] = spell._replace(until_s=wire.session.hearing.newest_s)
+    wire.session.intake.serving._spells[Sensor.POSE] = spell._replace(until_s=wire.session.intake.newest_s)
     wire.fly(0.1)
     assert Sensor.POSE in wire.session.alarms
     wire.fly(4.0)

@@ -13,12 +13,12 @@ from flownav.live.answers import RELATIVE_FLOOR_M, RELATIVE_S, as_relative, faul
 from flownav.live.options import Limits
 from flownav.live.vehicle_clock import COARSE_S, LONGEST_ROUND_TRIP_S, MOST_UNSEEN_S, VehicleClock
 from flownav.logs.mavlink import outgoing as say
+from flownav.navigation.kernel_settings import NO_HEADING, Equipment
 from flownav.navigation.loop import start_navigator
 from flownav.navigation.memory import MEMORY, PROTECTION
 from flownav.navigation.records import AidMemory
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tape import empty_tape
-from flownav.navigation.told import NO_HEADING, Equipment
 from mavlink_logs import made
 
 LIMITS = Limits(sigma_m=4.0, sigma_m_s=2.0, protection_m=20.0, dead_reckoning_s=2.0, sigma_down_m=6.0)

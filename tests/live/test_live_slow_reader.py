@@ -40,7 +40,7 @@ def test_what_a_slow_reader_reads_is_of_now(reads_bytes_s):
     assert np.quantile(steady, 0.95) < 0.25 + 500.0 / reads_bytes_s
     assert ages(wire, 0.0).max() < 0.6 + 3000.0 / reads_bytes_s, "until it is noticed"
     assert wire.session.backlog.slow
-    assert wire.session.hearing.flow_waited > 500
+    assert wire.session.intake.flow_waited > 500
     wire.close()
 
 

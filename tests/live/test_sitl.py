@@ -20,7 +20,7 @@ from flownav.live.sitl.pad import sighted
 from flownav.live.sitl.pilot import SOURCE_SET, Case
 from flownav.live.sitl.score import figures
 from flownav.live.sitl.tables import Eyes, faults_of, parameters_of
-from flownav.live.sitl.wire import History, Line, Told, Truth
+from flownav.live.sitl.wire import History, Line, SentEstimate, Truth
 from flownav.logs.mavlink.framing import ARDUPILOT, coder, name_of
 from flownav.logs.mavlink.messages import TrueState
 from flownav.logs.mavlink.position_messages import local_position_m
@@ -145,7 +145,7 @@ class Autopilot:
     """As much of ArduPilot as sets parameters and switches sources: a wire to it. switched: its parameters then."""
 
     def __init__(self, parameters):
-        self.parameters, self.switched, self.heard = dict(parameters), [], []
+        self.parameters, self.switched, self.received = dict(parameters), [], []
         self.mav, self.history = coder(), History()
         self.latest = {"HEARTBEAT": self.mav.heartbeat_encode(2, ARDUPILOT, 0, 0, 4, 3)}
 
@@ -160,7 +160,7 @@ class Autopilot:
             assert (kind, message.command) == ("COMMAND_LONG", SOURCE_SET)
             self.switched.append((message.param1, dict(self.parameters)))
             answer = self.mav.command_ack_encode(SOURCE_SET, 0)
-        for hear in self.heard:
+        for hear in self.received:
             hear(answer)
 
     def until(self, true, _limit_s):
@@ -176,7 +176,7 @@ def test_the_source_set_is_flownavs_when_it_is_switched_to(gps):
     pilot = object.__new__(PILOTS["ardupilot"])
     pilot.case, pilot.slot, pilot._acks, pilot._values = Case("copter", gps), 1, {}, {}
     pilot.wire = Autopilot({name: 5.0 for name in sources})
-    pilot.wire.heard.append(pilot._heard)
+    pilot.wire.received.append(pilot._received)
     pilot.fly_on_flownav()
     ((number, then),) = pilot.wire.switched
     assert number == 2.0
@@ -187,7 +187,7 @@ def test_the_source_set_is_flownavs_when_it_is_switched_to(gps):
 def test_a_simulator_in_its_own_folder_finds_what_was_told_relative(make, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(PILOTS[make], "connected", lambda _: History())
-    monkeypatch.setattr(History, "heard", [], raising=False)
+    monkeypatch.setattr(History, "received", [], raising=False)
     monkeypatch.setattr(History, "beats", [], raising=False)
     case = Case(PILOTS[make].vehicles[0], "cut")
     pilot = PILOTS[make](Path("bin/program"), Path("out/flight"), 1, case)
@@ -206,8 +206,8 @@ def a_flight(told_north_m, resets=lambda t_s: 0, true_north_m=lambda t_s: 0.0, g
     history.truth = [Truth(0.0, state(down_m=0.0))]
     history.truth += [Truth(t_s, state(true_north_m(t_s))) for t_s in np.arange(5.0, 40.0, 0.05)]
     history.truth.append(Truth(41.0, state(true_north_m(40.0), end_down_m)))
-    history.told = [
-        Told(t_s, t_s, (told_north_m(t_s), 0.0, -5.0), 80, resets(t_s))
+    history.estimates = [
+        SentEstimate(t_s, t_s, (told_north_m(t_s), 0.0, -5.0), 80, resets(t_s))
         for t_s in np.arange(8.0, 40.0, 0.1)
         if told_north_m(t_s) is not None
     ]

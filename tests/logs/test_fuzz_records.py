@@ -48,7 +48,7 @@ def replayed(path: Path) -> Replay:
 def assert_finite(flown: Replay) -> None:
     """Assert the promise of a replay about any input."""
     assert np.isfinite(flown.estimate).all()
-    assert np.all(np.diff(flown.said.t_s) >= 0.0)
+    assert np.all(np.diff(flown.estimate_rows.t_s) >= 0.0)
     flown.scores()
 
 

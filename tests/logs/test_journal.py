@@ -30,7 +30,7 @@ def test_what_was_written_is_read():
     parts = read(FILE)
     assert numbers(parts) == [0, 1, 2, 3]
     assert len(parts) == 4
-    assert parts[2].said == {"notes": [[0.5, "a", "b2"]]}
+    assert parts[2].stated == {"notes": [[0.5, "a", "b2"]]}
     for name, values in ROWS.items():
         np.testing.assert_array_equal(parts[3].rows[name], values)
 

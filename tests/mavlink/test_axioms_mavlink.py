@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.logs.mavlink.clock import WRAP_MS_S, ClockState, Stamp, align, timesync_offset_s, told_unix_time
+from flownav.logs.mavlink.clock import WRAP_MS_S, ClockState, Stamp, align, received_unix_time, timesync_offset_s
 
 BOOT, OTHER, UNIX = (1, 1, "boot"), (1, 158, "boot"), (1, 1, "unix")
 UNIX_S = 1.8e9
@@ -62,7 +62,7 @@ def test_system_time_is_of_the_same_instant_before_and_after_a_wrap(start_s):
     """UNIX stamps that a GPS gives are laid on the log by SYSTEM_TIME, which says the count that has wrapped."""
     own, _, _, state = heard(start_s, 0.0)
     now_s = start_s + 0.5 * 59
-    state = told_unix_time(state, UNIX, UNIX_S, now_s % WRAP_MS_S)
+    state = received_unix_time(state, UNIX, UNIX_S, now_s % WRAP_MS_S)
     _, aligned = align(state, 0.5 * 59 + 0.9, Stamp(UNIX, UNIX_S + 0.25))
     assert aligned.reason == ""
     assert aligned.t_s == pytest.approx(own[-1] + 0.25, abs=5e-3)

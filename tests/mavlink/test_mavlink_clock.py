@@ -15,9 +15,9 @@ from flownav.logs.mavlink.clock import (
     ClockState,
     Stamp,
     align,
+    received_unix_time,
     stamp_of,
     timesync_offset_s,
-    told_unix_time,
 )
 from mavlink_logs import made
 
@@ -172,10 +172,10 @@ def test_unix_stamps_and_system_time():
     waited = times([(10.0, BOOT, 10.0), (10.3, UNIX, UNIX_S)])
     assert waited == pytest.approx([10.0, 10.3])
     state, _ = run([(10.0, BOOT, 10.0)])
-    told = told_unix_time(state, UNIX, UNIX_S, 9.5)
+    told = received_unix_time(state, UNIX, UNIX_S, 9.5)
     assert times([(10.3, UNIX, UNIX_S + 0.6)], told) == pytest.approx([10.1], abs=3e-4)
-    assert told_unix_time(state, UNIX, 0.0, 9.5) == state
-    assert told_unix_time(ClockState(BOOT), UNIX, UNIX_S, 9.5) == ClockState(BOOT)
+    assert received_unix_time(state, UNIX, 0.0, 9.5) == state
+    assert received_unix_time(ClockState(BOOT), UNIX, UNIX_S, 9.5) == ClockState(BOOT)
 
 
 # -- a message's own stamp ---------------------------------------------------------------------------------

@@ -34,6 +34,7 @@ from flownav.navigation.gps import judge_rejections, squared_acceleration
 from flownav.navigation.heading import heading_variance
 from flownav.navigation.height import judge_ground, repeats
 from flownav.navigation.inertial import SWING_S, paid, steady_force, turning_noise
+from flownav.navigation.kernel_settings import NO_HEADING, Equipment
 from flownav.navigation.loop import start_navigator
 from flownav.navigation.memory import CLOCK, MEMORY, SCALE_DOUBT, new_work
 from flownav.navigation.motion_records import (
@@ -45,7 +46,7 @@ from flownav.navigation.motion_records import (
     StandMemory,
     SteadyForce,
 )
-from flownav.navigation.now import Carried, carried, coasted
+from flownav.navigation.now import NowState, coasted, moved_on
 from flownav.navigation.place import judge_pad
 from flownav.navigation.protection import levels
 from flownav.navigation.reasons import FUSED
@@ -66,7 +67,6 @@ from flownav.navigation.spikes import BURST_S, LONE_SHARE, MOST_DOUBT_M_S, doubt
 from flownav.navigation.still import GYRO_FLOOR_RAD_S, offer_bias
 from flownav.navigation.suspicion import HELD_S, judge_suspicion
 from flownav.navigation.tape import empty_tape
-from flownav.navigation.told import NO_HEADING, Equipment
 from flownav.navigation.verdicts import AxisBias, Force, Height
 from flownav.navigation.waiting_records import Sizes
 from flownav.navigation.windows import RESTS, SHAKEN, with_imu
@@ -81,9 +81,9 @@ def floats(rng: np.random.Generator, count: int, size: float = 1.0) -> tuple[flo
     return tuple(float(x) for x in size * rng.normal(size=count))
 
 
-def drawn_state(rng: np.random.Generator) -> Carried:
+def drawn_state(rng: np.random.Generator) -> NowState:
     q = quaternion_from_euler(*floats(rng, 2, 0.4), float(rng.uniform(-3.0, 3.0)))
-    return Carried(*floats(rng, 6, 3.0), *(float(x) for x in q), *floats(rng, 3, 0.02), *floats(rng, 3, 0.2))
+    return NowState(*floats(rng, 6, 3.0), *(float(x) for x in q), *floats(rng, 3, 0.02), *floats(rng, 3, 0.2))
 
 
 def about_down(pair, angle):
@@ -91,7 +91,7 @@ def about_down(pair, angle):
     return cosine * pair[0] - sine * pair[1], sine * pair[0] + cosine * pair[1]
 
 
-def turned(s: Carried, angle: float) -> Carried:
+def turned(s: NowState, angle: float) -> NowState:
     """The state in a world that is turned about down; the biases are of the body."""
     (n, e), (vn, ve) = about_down((s.pos_n, s.pos_e), angle), about_down((s.vel_n, s.vel_e), angle)
     q = turned_about_down((s.qw, s.qx, s.qy, s.qz), angle)
@@ -117,7 +117,7 @@ def test_what_is_carried_gains_the_energy_that_its_force_has_along_its_way(seed)
     rng = np.random.default_rng(seed)
     s, between = drawn_state(rng), floats(rng, 6, 2.0)
     for dt_s in (0.004, 0.1, -0.05):
-        after = carried(s, between, dt_s)
+        after = moved_on(s, between, dt_s)
         accel = np.subtract(after[3:6], s[3:6]) / dt_s
         way = np.subtract(after[:3], s[:3])
         assert accel @ way == pytest.approx(0.5 * (np.square(after[3:6]).sum() - np.square(s[3:6]).sum()), rel=1e-9)
@@ -133,14 +133,14 @@ def test_one_that_stands_is_carried_nowhere_in_any_attitude(seed):
     rotation = np.reshape(rotation_from_quaternion(*s[6:10]), (3, 3))
     weight = rotation.T @ [0.0, 0.0, -GRAVITY_M_S2]
     reads = (*s[10:13], *(float(x) for x in weight + s[13:16]))
-    assert carried(s, reads, 0.5) == pytest.approx(s, abs=1e-12)
+    assert moved_on(s, reads, 0.5) == pytest.approx(s, abs=1e-12)
 
 
 @SEEDS
 def test_where_north_is_matters_to_nobody_who_is_carried(seed):
     rng = np.random.default_rng(seed)
     s, between, angle = drawn_state(rng), floats(rng, 6, 2.0), float(rng.uniform(-3.0, 3.0))
-    assert carried(turned(s, angle), between, 0.2) == pytest.approx(turned(carried(s, between, 0.2), angle), rel=1e-9)
+    assert moved_on(turned(s, angle), between, 0.2) == pytest.approx(turned(moved_on(s, between, 0.2), angle), rel=1e-9)
     assert coasted(turned(s, angle), 0.2) == pytest.approx(turned(coasted(s, 0.2), angle), rel=1e-9)
 
 
@@ -149,7 +149,7 @@ def test_the_state_of_an_instant_hangs_on_no_later_reading_and_on_no_zero_of_tim
     on = start_navigator(FITTED, NavigatorSettingsFile(), empty_tape(1, 1, 1))
     s = drawn_state(rng)
     for name, value in s._asdict().items():
-        on.work[MEMORY.row(Carried, name)] = value
+        on.work[MEMORY.row(NowState, name)] = value
     kept = ImuMemory(read_s=8.0, gyro_x=0.1, gyro_y=-0.2, gyro_z=0.3, accel_x=0.4, accel_y=0.5, accel_z=-9.0)
     for name, value in kept._asdict().items():
         on.work[MEMORY.row(ImuMemory, name)] = value
@@ -234,7 +234,7 @@ def test_a_receiver_that_smooths_says_the_velocity_of_a_lag_ago(seed):
     s, felt = drawn_state(rng)._replace(gyro_bias_x=0.0, gyro_bias_y=0.0, gyro_bias_z=0.0), floats(rng, 3, 2.0)
     between = (0.0, 0.0, 0.0, *felt)  # turning nowhere, a force is held in the earth's axes
     force = to_earth(rotation_from_quaternion(*s[6:10]), *np.subtract(felt, s[13:16]))
-    earlier = carried(s, between, -0.2)
+    earlier = moved_on(s, between, -0.2)
     none, still = Lever(0.0, 0.0, 0.0), BodyRate(0.0, 0.0, 0.0)
     for axis in range(3):
         expected, _ = gps_velocity.law(

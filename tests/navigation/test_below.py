@@ -11,9 +11,9 @@ import pytest
 from flownav.estimation.named import VelocityNed
 from flownav.estimation.states import GROUND, PAD
 from flownav.navigation.ground import DRIFT_S, drifting, lasting_walk, terrain_walk, walk_below
+from flownav.navigation.kernel_settings import NO_HEADING, Equipment
 from flownav.navigation.motion_records import DriftMemory
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.told import NO_HEADING, Equipment
 from flownav.navigation.verdicts import GroundBelow
 
 TOLD = NavigatorSettingsFile(

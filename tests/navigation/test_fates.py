@@ -13,6 +13,7 @@ from flownav.navigation import verdicts
 from flownav.navigation.compass import check_compass
 from flownav.navigation.course import FOUND_RAD, LEAST_TRAVEL_M, find_heading
 from flownav.navigation.gps import UNKNOWN_PAD_M, AlongAxis, judge_fate
+from flownav.navigation.kernel_settings import NO_HEADING, Equipment
 from flownav.navigation.motion_records import CourseMemory, ImuMemory, PushMemory
 from flownav.navigation.offers import compare_level, note_aid, note_aid_age, note_height
 from flownav.navigation.place import (
@@ -52,7 +53,6 @@ from flownav.navigation.tape import (
     PAD_FOUND,
     POSITION_INVALID,
 )
-from flownav.navigation.told import NO_HEADING, Equipment
 from flownav.navigation.verdicts import Fate, Offer
 
 NAN = math.nan
@@ -91,7 +91,7 @@ def test_a_position_that_is_refused_for_long_goes_to_the_fix_and_its_lasting_err
     assert placed(found.goes) == [(GPS_SLOW + 1, 0.0), (GPS_FAST + 1, 0.0), (POSITION + 1, 20.0)]
     lasting = s.gps_slow_sigma_m**2 + s.gps_fast_sigma_m**2
     assert found.goes[2].variance == pytest.approx(lasting + 0.25)
-    assert found.told == (GPS_RESET, 18.0)
+    assert found.event == (GPS_RESET, 18.0)
     assert (found.memory.gps.moved_n_m, found.memory.gps.moved_e_m) == (1.0, 20.0)
     assert found.memory.rejection.times == 0.0
 
@@ -100,7 +100,7 @@ def test_a_velocity_that_is_refused_for_long_goes_to_the_fix_and_moves_no_positi
     found = fate(axis=2, position=False)
     assert placed(found.goes) == [(GPS_VELOCITY + 2, 0.0), (VELOCITY + 2, 30.0)]
     assert found.goes[2].variance == pytest.approx(TOLD.gps.gps_velocity_sigma_down_m_s**2 + 0.25)
-    assert found.told == (GPS_RESET, 27.0)
+    assert found.event == (GPS_RESET, 27.0)
     assert (found.memory.gps.moved_n_m, found.memory.gps.moved_e_m) == (1.0, 2.0)
 
 
@@ -137,7 +137,7 @@ def test_the_pad_goes_along_with_the_position_where_it_is_known_and_nobody_doubt
 
 def test_gps_tells_where_north_or_east_is_fused():
     for axis, reason, told_s in ((0, FUSED, 99.0), (1, FUSED, 99.0), (2, FUSED, -math.inf), (0, SILENT, -math.inf)):
-        assert fate(verdicts.Tested(reason, 0.0, 1.0, 1.0), axis=axis).memory.gps.told_s == told_s
+        assert fate(verdicts.Tested(reason, 0.0, 1.0, 1.0), axis=axis).memory.gps.last_fix_s == told_s
 
 
 def test_the_level_ratio_is_the_larger_of_north_and_east_of_one_fix():
@@ -297,10 +297,10 @@ def test_a_lane_starts_at_a_fix_or_at_the_origin():
     at_fix = begun()
     assert at_fix.first.starts
     assert at_fix.first.position == (1.0, 2.0, -3.0)
-    assert (at_fix.start.started, at_fix.aid.aided_s, at_fix.aid.flag, at_fix.told.value) == (1.0, 5.0, 0.0, 1.0)
+    assert (at_fix.start.started, at_fix.aid.aided_s, at_fix.aid.flag, at_fix.event.value) == (1.0, 5.0, 0.0, 1.0)
     at_origin = begun(sensor=Sensor.FLOW_RATE)
     assert at_origin.first.starts
-    assert (at_origin.first.position, at_origin.told.value) == ((0.0, 0.0, 0.0), 0.0)
+    assert (at_origin.first.position, at_origin.event.value) == ((0.0, 0.0, 0.0), 0.0)
 
 
 @pytest.mark.parametrize(("m", "sensor", "values"), [
@@ -313,7 +313,7 @@ def test_a_lane_starts_at_a_fix_or_at_the_origin():
 def test_a_lane_that_runs_knows_no_attitude_or_reads_no_place_does_not_start(m, sensor, values):
     waits = begun(m, sensor, values=values)
     assert not waits.first.starts
-    assert (waits.start, waits.aid, waits.heading, waits.told.kind) == (m, AidMemory(flag=2.0), HeadingMemory(), -1)
+    assert (waits.start, waits.aid, waits.heading, waits.event.kind) == (m, AidMemory(flag=2.0), HeadingMemory(), -1)
 
 
 def test_a_heading_is_sought_where_none_is_read_and_the_start_does_not_define_it():
@@ -321,7 +321,7 @@ def test_a_heading_is_sought_where_none_is_read_and_the_start_does_not_define_it
     assert begun(fitted=lost).heading.sought == 1.0
     assert begun().heading.sought == 0.0
     assert begun(STANDS._replace(attitude_s=4.0), fitted=lost).heading.sought == 0.0
-    assert (begun().first.untold_scale, begun(fitted=lost).first.untold_scale) == (True, False)
+    assert (begun().first.scale_unstated, begun(fitted=lost).first.scale_unstated) == (True, False)
 
 
 def test_a_vehicle_flies_when_it_is_said_to_for_five_seconds_and_a_bounce_is_no_flight():

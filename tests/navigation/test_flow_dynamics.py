@@ -20,6 +20,7 @@ from flownav.estimation.lag import Lagged, LagLens, LagMove, lag_of_step, lag_ov
 from flownav.estimation.named import Attitude, BodyRate, Height, VelocityNed
 from flownav.estimation.states import FLOW_LAG, STATE
 from flownav.logs.open_log import open_flight
+from flownav.navigation.kernel_settings import FROM_MAG, Equipment
 from flownav.navigation.loop import start_navigator
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import settings_of
@@ -32,7 +33,6 @@ from flownav.navigation.take import (
     navigator_unit,
 )
 from flownav.navigation.tape import new_tape
-from flownav.navigation.told import FROM_MAG, Equipment
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
@@ -90,11 +90,11 @@ def flight_with(setup, *, lagged):
     """The same vehicle, whose navigator takes the dynamics for a delay or carries them as states."""
     carried, flow = setup.fitted, setup.sensor.dynamics
     keys = {"flow_lag_b_1_s": flow.b_1_s, "flow_lag_c_1_s2": flow.c_1_s2} if lagged else {}
-    settings = carried.told.settings.model_copy(update={"flow_lag_b_1_s": 0.0, "flow_lag_c_1_s2": 0.0} | keys)
+    settings = carried.given.settings.model_copy(update={"flow_lag_b_1_s": 0.0, "flow_lag_c_1_s2": 0.0} | keys)
     timing = carried.timing[Sensor.FLOW_RATE]
     stated = Timing(0.0 if lagged else flow.delay_s, timing.latency_s, timing.jitter_s)
     other = refitted(
-        carried, setup.flight.plan.epochs, told=carried.told._replace(settings=settings),
+        carried, setup.flight.plan.epochs, given=carried.given._replace(settings=settings),
         stated=carried.timing | {Sensor.FLOW_RATE: stated},
     )  # fmt: skip
     return setup.flight._replace(table=other.schedule, settings=other.settings)

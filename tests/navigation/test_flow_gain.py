@@ -9,10 +9,10 @@ import pytest
 
 from flownav.core.measurement import Sensor
 from flownav.navigation.flow import offer_component
+from flownav.navigation.kernel_settings import NO_HEADING, NO_STATED_NOISE, Equipment, FlowSettings
 from flownav.navigation.reasons import FUSED
 from flownav.navigation.records import FlowMemory, Look, Reading
 from flownav.navigation.settings_of import settings_of
-from flownav.navigation.told import NO_HEADING, NO_STATED_NOISE, Equipment, FlowSettings
 from flownav.navigation.verdicts import Biases
 from flownav.sensors.camera_sheets import FlowCameraSheet
 from flownav.sensors.datasheet import FlowSensor, load_sensor

@@ -237,17 +237,17 @@ def away(t_s: np.ndarray) -> np.ndarray:
 def test_without_a_fix_the_doubt_of_the_flows_scale_is_stated_by_the_way_from_the_start():
     flown = fly(away, 20.0)
     alone = navigate(flown.only(*OWN))
-    way_m = alone.said.pos_ned_m[:, 0]
+    way_m = alone.estimate_rows.pos_ned_m[:, 0]
     scale = alone.column(FLOW_SCALE)
     assert scale.max() == scale.min() == 0.0
     assert alone.sigma(FLOW_SCALE) == 0.0
     assert way_m[-1] > 25.0
-    stated = alone.said.std_pos_ned_m[:, 0]
+    stated = alone.estimate_rows.std_pos_ned_m[:, 0]
     assert np.all(stated >= 0.1 * way_m)
     assert stated[-1] == pytest.approx(math.hypot(0.1 * way_m[-1], alone.sigma(0)), rel=1e-5)
-    assert alone.said.std_pos_ned_m[-1, 1] == pytest.approx(alone.sigma(1), abs=0.01)  # east it did not go
+    assert alone.estimate_rows.std_pos_ned_m[-1, 1] == pytest.approx(alone.sigma(1), abs=0.01)  # east it did not go
     fixed = navigate(flown)
-    assert fixed.said.std_pos_ned_m[-1, 0] == pytest.approx(fixed.sigma(0), rel=1e-3)
+    assert fixed.estimate_rows.std_pos_ned_m[-1, 0] == pytest.approx(fixed.sigma(0), rel=1e-3)
     assert 0.0 < fixed.sigma(FLOW_SCALE) < 0.1
 
 
@@ -257,7 +257,7 @@ def test_the_scales_doubt_covers_a_lens_that_scales_wrongly():
     run_ = navigate(flown.changed(Sensor.FLOW_RATE, value=stream.value * [1.1, 1.1, 1.0, 1.0, 1.0, 1.0]))
     off = np.abs(run_.error[:, 0] - run_.error[0, 0])
     assert off[-1] > 2.0
-    assert np.all(off < 2.0 * run_.said.std_pos_ned_m[:, 0])
+    assert np.all(off < 2.0 * run_.estimate_rows.std_pos_ned_m[:, 0])
 
 
 def test_a_hover_that_a_low_range_takes_for_the_ground_teaches_no_gyro_and_holds_no_velocity():

@@ -18,7 +18,9 @@ from flownav.navigation.flow_noise import alike, flow_variance, followed_agreeme
 from flownav.navigation.gps import LAG_LEFT, LEAPT_RATIO, add_lag, follow_fix_noise, judge_fix, judge_rejections
 from flownav.navigation.heading import heading_variance, magnetic_heading
 from flownav.navigation.height import range_variance, range_verdict, repeats
-from flownav.navigation.inertial import motion_between, said_by, sound
+from flownav.navigation.inertial import motion_between, motion_of, sound
+from flownav.navigation.kernel_settings import NO_HEADING as HEADLESS
+from flownav.navigation.kernel_settings import Equipment
 from flownav.navigation.motion_records import ImuMemory, SteadyForce
 from flownav.navigation.place import judge_pad, judge_pose, late_variance
 from flownav.navigation.reasons import (
@@ -53,8 +55,6 @@ from flownav.navigation.records import (
 )
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tape import BARO_FOUND
-from flownav.navigation.told import NO_HEADING as HEADLESS
-from flownav.navigation.told import Equipment
 from flownav.navigation.trust import CREEPING_M_S, OF_GPS, creeps
 from flownav.navigation.verdicts import Event, Height, Noise, Offer, Reset
 from flownav.navigation.verdicts import Tested as Outcome
@@ -310,7 +310,7 @@ def range_memory(**parts) -> RangeMemory:
         "last_m": NAN,
         "same_s": NAN,
         "down_m": 0.0,
-        "said_s": NAN,
+        "stuck_s": NAN,
     }
     return RangeMemory(**{name: 0.0 for name in RangeMemory._fields} | empty | parts)
 
@@ -473,7 +473,7 @@ def test_between_two_readings_their_mean_stands_or_the_later_of_a_unit_that_inte
 
 def test_a_sound_reading_is_finite_arrived_and_not_withheld():
     assert sound(reading(*[0.1] * 6))
-    assert said_by(reading(*range(6))) == (0, 1, 2, 3, 4, 5)
+    assert motion_of(reading(*range(6))) == (0, 1, 2, 3, 4, 5)
     for bad in (reading(*[0.1] * 5, NAN), reading(*[0.1] * 6, arrived=0.0), reading(*[0.1] * 6, withheld=1.0)):
         assert not sound(bad)
 

@@ -11,6 +11,7 @@ from flownav.core.compile import LANES, LANES_WIDE
 from flownav.core.frames import GRAVITY_M_S2
 from flownav.core.measurement import MAX_VALUES, EventQueue, Sensor, Stream, merge
 from flownav.estimation.states import QUATERNION, STATE, STATES
+from flownav.navigation.kernel_settings import FROM_ATTITUDE, FROM_MAG, NO_HEADING, Equipment
 from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.memory import READING, load_start, new_work
 from flownav.navigation.packed import pack
@@ -19,7 +20,6 @@ from flownav.navigation.rows import EventRow
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.take import navigate_lanes
 from flownav.navigation.tape import COMPONENTS, EVENT_NAMES, Tape, empty_tape, new_tape, room_of
-from flownav.navigation.told import FROM_ATTITUDE, FROM_MAG, NO_HEADING, Equipment
 from navigation_streams import circle, fly
 from packed_covariance import unpack
 

@@ -12,9 +12,9 @@ from flownav.core.measurement import Sensor
 from flownav.estimation.states import ATTITUDE, FLOW_SCALE, INS_ERROR
 from flownav.navigation.feed import heading_source
 from flownav.navigation.heading import RECONSIDERED_S, weigh_heading
+from flownav.navigation.kernel_settings import FROM_MAG, NO_HEADING
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT
 from flownav.navigation.records import GpsMemory, HeadingMemory
-from flownav.navigation.told import FROM_MAG, NO_HEADING
 from flownav.navigation.verdicts import Doubt, Fate, Noise
 from flownav.navigation.verdicts import Tested as Outcome
 from navigation_streams import Flown, body_axes, circle, fly, navigate
@@ -26,7 +26,7 @@ NONE = (Doubt(ATTITUDE + 2, 0.0), Doubt(INS_ERROR + 2, 0.0))
 
 
 # -- the gate of a heading -----------------------------------------------------------------------------------
-GONE, HOLDS = GpsMemory(), GpsMemory(told_s=1.0e9)
+GONE, HOLDS = GpsMemory(), GpsMemory(last_fix_s=1.0e9)
 
 
 def weighed(innovation: float, m: HeadingMemory, t_s: float = 1.0, reason: int = FUSED, gps: GpsMemory = GONE):
@@ -119,7 +119,7 @@ def test_wrong_fields_at_the_start_are_unlearnt(sensors, wrong, angle_deg):
     flown = fly(circle, 40.0, yaw_rate=0.1).only(*sensors)
     found = navigate(turned_aside(flown, math.radians(angle_deg), -1.0, 0.1 * wrong - 0.05))
     late = found.t_s > 20.0
-    stated = found.said.std_tilt_ned_rad[late, 2]
+    stated = found.estimate_rows.std_tilt_ned_rad[late, 2]
     assert (np.abs(found.yaw_error[late]) < 2.0 * stated).all()
     assert np.abs(found.yaw_error[late]).max() < math.radians(16.0)
 

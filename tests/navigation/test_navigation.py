@@ -27,7 +27,7 @@ def test_it_starts_level_from_the_accelerometer_alone():
     for sensor in (*GPS, Sensor.FLOW_RATE):  # later than the accelerometer's first readings
         flown = flown.cut(sensor, 0.0, 0.5)
     run = navigate(flown)
-    w, x, y, _ = run.said.quaternion[0]
+    w, x, y, _ = run.estimate_rows.quaternion[0]
     tilted, lasting, noise = (0.1 * GRAVITY_M_S2) ** 2, 0.2**2, 0.15**2
     believed = tilted / (tilted + lasting + noise)
     assert believed > 0.9
@@ -150,9 +150,9 @@ def test_pad_fixes_pull_the_position_to_centimetres():
     fixes = np.column_stack([0 * t_s, 0 * t_s, 0 * t_s + 2.0])
     run = navigate(flown.added(Stream.of(Sensor.PAD, t_s, fixes, variance=np.full((len(t_s), 3), 1e-6))))
     late = run.t_s > 5.0
-    from_pad = run.said.pos_ned_m[late] - run.column(PAD, 3)[late]
+    from_pad = run.estimate_rows.pos_ned_m[late] - run.column(PAD, 3)[late]
     assert np.abs(from_pad - [0.0, 0.0, -2.0]).max() < 0.01
-    in_earth_m = run.said.std_pos_ned_m[-1, 0]
+    in_earth_m = run.estimate_rows.std_pos_ned_m[-1, 0]
     assert run.sigma(PAD) == pytest.approx(in_earth_m, rel=0.01)  # it is no better known there
     assert run.sigma(PAD) > 0.2
     assert len(run.events("pad", "found")) == 1
@@ -168,7 +168,7 @@ def test_a_pad_first_seen_where_there_is_none_is_found_where_it_is(wrong_first, 
     fixes[:wrong_first, axis], fixes[200, 1] = 1.0, -1.0
     run = navigate(flown.added(Stream.of(Sensor.PAD, t_s, fixes, variance=np.full((len(t_s), 3), 1e-6))))
     late = run.t_s > 3.0
-    from_pad = run.said.pos_ned_m[late] - run.column(PAD, 3)[late]
+    from_pad = run.estimate_rows.pos_ned_m[late] - run.column(PAD, 3)[late]
     assert np.abs(from_pad - [0.0, 0.0, -2.0]).max() < 0.02
     assert len(run.events("pad", "found")) == 2
     assert run.reasons(Sensor.PAD)["innovation_gate"] <= 16
@@ -179,7 +179,7 @@ def test_an_external_pose_is_enough():
     t_s = np.arange(0.2, 20.0, 0.05)
     run = navigate(flown.added(Stream.of(Sensor.POSE, t_s, flown.at(t_s, flown.position - flown.position[1000]))))
     truth = flown.at(run.t_s, flown.position - flown.position[1000])
-    assert np.abs(run.said.pos_ned_m - truth).max() < 0.1
+    assert np.abs(run.estimate_rows.pos_ned_m - truth).max() < 0.1
     assert np.abs(run.velocity_error[run.t_s > 10.0]).max() < 0.05
     assert run.events("filter", "start")[:, 1] == pytest.approx([0.0])
 
@@ -195,7 +195,7 @@ def test_a_pose_that_is_50_m_off_to_the_north_and_2_to_the_east_is_refused_as_a_
     ]
     run = navigate(flown.added(Stream.of(Sensor.POSE, t_s, pose)))
     truth = flown.at(run.t_s, flown.position - flown.position[1000])
-    assert np.abs(run.said.pos_ned_m - truth)[:, 1].max() < 0.5
+    assert np.abs(run.estimate_rows.pos_ned_m - truth)[:, 1].max() < 0.5
     assert run.reasons(Sensor.POSE)["innovation_gate"] == 2
 
 

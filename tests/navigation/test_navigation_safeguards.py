@@ -127,14 +127,14 @@ def jumping(hover: Flown) -> Navigated:
 def test_a_gps_jump_of_20_m_is_refused_while_flow_is_good_and_after_7_s_accepted_without_flow(hover):
     assert len(jumping(hover).events("gps", "reset")) == 0
     run = jumping(hover.cut(Sensor.FLOW_RATE, 8.0, 99.0))
-    before = run.said.pos_ned_m[np.searchsorted(run.t_s, 9.99), 0]
-    during = run.said.pos_ned_m[(run.t_s >= 10.0) & (run.t_s < 12.0), 0]
+    before = run.estimate_rows.pos_ned_m[np.searchsorted(run.t_s, 9.99), 0]
+    during = run.estimate_rows.pos_ned_m[(run.t_s >= 10.0) & (run.t_s < 12.0), 0]
     assert np.abs(during - before).max() < 0.01
     reset = run.events("gps", "reset")
     assert len(reset) == 1
     assert reset[0] == pytest.approx([17.0, 20.0], abs=0.21)
     assert run.reasons(Sensor.GPS_POSITION)["innovation_gate"] == 2 * 36  # both axes of a fix
-    assert run.said.pos_ned_m[-1, 0] == pytest.approx(20.0, abs=0.5)
+    assert run.estimate_rows.pos_ned_m[-1, 0] == pytest.approx(20.0, abs=0.5)
 
 
 def blind(hover: Flown) -> Navigated:
@@ -230,7 +230,7 @@ def test_an_echo_is_not_believed_where_the_range_alone_tells_the_height(hover):
     heard = (rows[:, 0] >= 10.0 - 1e-6) & (rows[:, 0] < 10.3 - 1e-6)
     assert np.count_nonzero(heard) == 6
     assert np.sqrt(rows[heard, 6]).min() > 5.0  # metres
-    assert np.ptp(run.said.pos_ned_m[run.t_s > 9.0, 2]) < 0.02
+    assert np.ptp(run.estimate_rows.pos_ned_m[run.t_s > 9.0, 2]) < 0.02
     assert len(run.events("imu", "doubted")) == len(run.events("range", "reset")) == 0
 
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from flownav.core.measurement import Sensor
+from flownav.navigation.kernel_settings import NO_HEADING, Equipment, ImuSettings
 from flownav.navigation.motion_records import ToneMemory
-from flownav.navigation.notch import heard_tones
+from flownav.navigation.notch import tracked_tones
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import of_inertial
-from flownav.navigation.told import NO_HEADING, Equipment, ImuSettings
 from flownav.sensors.sheets import InertialSheet
 from navigation_streams import Flown, circle, fly, navigate
 
@@ -40,7 +40,7 @@ def passed(force: np.ndarray, s: ImuSettings, start: ToneMemory | None = None) -
     """Readings (n, 3) at PERIOD_S less their tones, and the memory after the last."""
     m, left = start or ToneMemory(), [(0.0, 0.0, 0.0)]
     for x, y, z in force:
-        m = heard_tones((x, y, z), left[-1], m, PERIOD_S, s)
+        m = tracked_tones((x, y, z), left[-1], m, PERIOD_S, s)
         left.append((x - m.taken_x, y - m.taken_y, z - m.taken_z))
     return np.array(left[1:]), m
 
@@ -140,7 +140,7 @@ def test_fewer_readings_than_the_sheets_rate_are_no_worse_off_with_the_notches(e
 def test_gravity_passes_whatever_the_tone_and_the_rate(tone_hz: float, period_s: float):
     m, left = ToneMemory(), (0.0, 0.0, 0.0)
     for _ in range(300):
-        m = heard_tones((0.3, -1.0, -9.8), left, m, period_s, told(tone_hz, 2.0 * tone_hz))
+        m = tracked_tones((0.3, -1.0, -9.8), left, m, period_s, told(tone_hz, 2.0 * tone_hz))
         left = (0.3 - m.taken_x, -1.0 - m.taken_y, -9.8 - m.taken_z)
     assert left == pytest.approx((0.3, -1.0, -9.8), abs=1e-6)
 
@@ -149,7 +149,7 @@ def test_a_tone_that_was_heard_fades_where_the_readings_become_fewer():
     _, m = passed(HOVER + shaken(INSTANTS_S), told())
     left = (0.3, -1.0, -9.8)
     for _ in range(500):
-        m = heard_tones((0.3, -1.0, -9.8), left, m, 0.02, told())
+        m = tracked_tones((0.3, -1.0, -9.8), left, m, 0.02, told())
         left = (0.3 - m.taken_x, -1.0 - m.taken_y, -9.8 - m.taken_z)
     assert left == pytest.approx((0.3, -1.0, -9.8), abs=1e-3)
 

@@ -33,7 +33,7 @@ def test_ground_without_texture_is_not_taken_for_standing_still(usual, seen, see
     found = navigate(flown)
     error = np.abs(found.error[:, :2])
     assert error.max() < 1.3
-    assert (error < 3.0 * found.said.std_pos_ned_m[:, :2]).mean() > 0.99
+    assert (error < 3.0 * found.estimate_rows.std_pos_ned_m[:, :2]).mean() > 0.99
 
 
 def test_a_sensor_that_always_says_poor_quality_is_believed():
@@ -78,7 +78,7 @@ def test_without_gps_and_flow_an_attitude_holds_the_tilt_and_its_own_error_is_kn
         held, alone = navigate(flown), navigate(flown.without(Sensor.ATTITUDE))
         with_it.append(np.hypot(*held.error[-1, :2]))
         without.append(np.hypot(*alone.error[-1, :2]))
-        assert with_it[-1] < 3.0 * np.hypot(*held.said.std_pos_ned_m[-1, :2])
+        assert with_it[-1] < 3.0 * np.hypot(*held.estimate_rows.std_pos_ned_m[-1, :2])
     assert np.mean(with_it) < 0.75 * np.mean(without)  # whose tilt and bias were separated before the outage
 
 

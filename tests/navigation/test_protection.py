@@ -125,7 +125,9 @@ def test_following_faults_changes_no_bit_of_the_estimate():
     on.work[HYPOTHESES] = 0.0
     run(queue, on)
     alone = EstimateRow.of(on.tape.estimates())
-    assert all(getattr(alone, name).tobytes() == getattr(followed.said, name).tobytes() for name in UNPROTECTED)
+    assert all(
+        getattr(alone, name).tobytes() == getattr(followed.estimate_rows, name).tobytes() for name in UNPROTECTED
+    )
     assert on.tape.offers().tobytes() == followed.offers.tobytes()
     assert followed.on.work[HYPOTHESES] == MOST_HYPOTHESES
 
@@ -191,7 +193,7 @@ def test_the_error_stays_within_the_level_or_something_is_said(name, seed):
         found = navigate(flown.only(*sensors))
         off = np.hypot(*(found.error - found.error[0])[:, :2].T)
         said = flagged(found.t_s, flags_of(found.on.tape.events()))
-        beyond = (off > found.said.protection_m[:, 0]) & ~said
+        beyond = (off > found.estimate_rows.protection_m[:, 0]) & ~said
         assert beyond.mean() < 0.02, (name, sensors)
 
 
@@ -200,9 +202,9 @@ def test_a_flight_without_faults_raises_no_suspicion_and_has_levels_of_use(senso
     for seed in (1, 2, 3):
         found = navigate(noisy(FLOWN, seed).only(*sensors))
         assert len(found.events("filter", "suspects")) == 0
-        levels_m = found.said.protection_m
+        levels_m = found.estimate_rows.protection_m
         assert np.isfinite(levels_m).all()
-        sigma = found.said.std_pos_ned_m[:, :2].max(axis=1)
+        sigma = found.estimate_rows.std_pos_ned_m[:, :2].max(axis=1)
         assert (levels_m[:, 0] >= 4.0 * sigma * 0.999).all()
         assert np.median(levels_m[:, 0]) < 20.0
 
@@ -213,7 +215,7 @@ def test_a_reversed_flow_is_suspected_by_name_and_the_suspicion_lasts():
     found, plain = navigate(turned, accel_noise_m_s2_rt_hz=0.05), navigate(turned)
     assert plain.events("flow", "doubted")[0, 0] == pytest.approx(12.2, abs=0.3)
     off = np.hypot(*(plain.error - plain.error[0])[:, :2].T)
-    assert (off <= plain.said.protection_m[:, 0]).all()
+    assert (off <= plain.estimate_rows.protection_m[:, 0]).all()
     suspected = found.events("filter", "suspects")
     assert len(suspected)
     assert suspected[0, 0] == pytest.approx(12.5, abs=1.0)

@@ -275,7 +275,7 @@ class Minded:
             *(table.reshape(-1) for table in (tape.estimate, tape.innovation, tape.event)),
             *(table.reshape(-1) for table in tape.journal), room_of(tape), tape.used,
         )  # fmt: skip
-        work[MEMORY.row(GpsMemory, "told_s")] = np.inf
+        work[MEMORY.row(GpsMemory, "last_fix_s")] = np.inf
 
     def at(self, t_s, dt_s=1e-9):
         mind_faults(self.work, ONE_LANE, t_s, dt_s, self.output)
@@ -347,7 +347,7 @@ def test_what_was_told_and_what_is_left_over_fade(work):
 def test_while_a_reversed_flow_is_possible_what_is_left_over_grows_by_twice_the_way(work, evidence, doubted, unheld):
     minded = Minded(work)
     work[FLOW_SPEED] = 3.0
-    work[MEMORY.row(GpsMemory, "told_s")] = -np.inf if unheld else np.inf
+    work[MEMORY.row(GpsMemory, "last_fix_s")] = -np.inf if unheld else np.inf
     if doubted:
         store_flow(work, ONE_LANE, 0, load_flow(work, ONE_LANE, 0)._replace(doubted=1.0))
     evident(work, FLOW_REVERSED, 0.3, evidence)

@@ -9,23 +9,25 @@ import pytest
 from flownav.estimation.states import ACCEL_BIAS, GROUND, POSITION, VELOCITY
 from flownav.navigation import verdicts
 from flownav.navigation.height import judge_refusal
+from flownav.navigation.kernel_settings import NO_HEADING, Equipment
 from flownav.navigation.motion_records import ImuMemory
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE
 from flownav.navigation.records import AidMemory, EchoMemory, GroundMemory, RangeMemory, RangingMemory, Reading
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tape import IMU_DOUBTED
-from flownav.navigation.told import NO_HEADING, Equipment
 
 NAN = math.nan
 HEIGHT = NavigatorSettingsFile().settings(Equipment(True, False, NO_HEADING, False, -math.inf)).height
 RANGE = Reading(2.0, *[NAN] * 8, 255.0, 1.0, 0.0)
 
 
-def refusal(crept_sigmas=2.0, sigmas=6.0, refused_s=NAN, told_s=0.0, reason=INNOVATION_GATE, stray=0.0, doubted=0.0):
+def refusal(
+    crept_sigmas=2.0, sigmas=6.0, refused_s=NAN, last_fix_s=0.0, reason=INNOVATION_GATE, stray=0.0, doubted=0.0
+):
     """The consequence of a range whose innovation is this number of standard deviations of 0.1 m, at 1 s."""
     return judge_refusal.law(
         verdicts.Tested(reason, 0.1 * sigmas, 0.01, 0.005), RANGE, verdicts.Height(-2.0, 0.1, 1.0),
-        AidMemory(height_s=1.0 - told_s),
+        AidMemory(height_s=1.0 - last_fix_s),
         RangingMemory(
             RangeMemory(sigmas=crept_sigmas, refused_s=refused_s, doubted=doubted), EchoMemory(stray=stray),
             GroundMemory(known=1.0),
@@ -53,9 +55,9 @@ def test_a_range_that_crept_out_and_stays_out_frees_height_ground_climb_and_ever
 
 def test_a_range_that_jumped_and_alone_tells_the_height_frees_the_vertical_alone():
     """The ground stays: it may be an echo."""
-    found = refusal(crept_sigmas=0.5, refused_s=0.9, told_s=99.0)
+    found = refusal(crept_sigmas=0.5, refused_s=0.9, last_fix_s=99.0)
     assert set(freed(found)) == {POSITION + 2, VELOCITY + 2, ACCEL_BIAS + 2}
-    assert freed(refusal(crept_sigmas=0.5, refused_s=0.97, told_s=99.0)) == {}  # too soon
+    assert freed(refusal(crept_sigmas=0.5, refused_s=0.97, last_fix_s=99.0)) == {}  # too soon
 
 
 @pytest.mark.parametrize("what", [

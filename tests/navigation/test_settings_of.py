@@ -9,11 +9,11 @@ import pytest
 
 from flownav.core.frames import GRAVITY_M_S2
 from flownav.navigation.flow_noise import flow_variance
+from flownav.navigation.kernel_settings import NO_HEADING, NO_STATED_NOISE, Equipment
 from flownav.navigation.motion_records import ImuMemory
 from flownav.navigation.records import Reading
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import noise_of, of_gps_receiver, of_inertial, of_magnetometer, settings_of
-from flownav.navigation.told import NO_HEADING, NO_STATED_NOISE, Equipment
 from flownav.navigation.vibration import followed_gyro_power, with_reading
 from flownav.sensors.datasheet import load_sensor
 from flownav.sensors.magnetometer import MagneticField, MagnetometerSheet

@@ -127,7 +127,7 @@ class Step:
     def __init__(self, before: np.ndarray, on: Running, reset: list[int]) -> None:
         self.covariance, after = unpack(before, ONE_LANE, 0, STATES), unpack(on.work, ONE_LANE, 0, STATES)
         decayed_s = float(on.work[ERRORS_CLOCK] - before[ERRORS_CLOCK])
-        decay = dense_decay(decayed_s, on.told.filter) if 0.0 < decayed_s < np.inf else np.eye(STATES)
+        decay = dense_decay(decayed_s, on.given.filter) if 0.0 < decayed_s < np.inf else np.eye(STATES)
         if on.clock_s > before[CLOCK]:
             middle, force = on.work[MIDDLE : MIDDLE + 9], on.work[FORCE : FORCE + 3]
             self.transition = decay @ dense_transition(on.clock_s - before[CLOCK], middle, force)
@@ -277,7 +277,7 @@ def test_over_many_flights_it_errs_less_than_the_filter_and_as_much_as_it_says(c
 
 def test_it_never_says_that_it_knows_less_than_the_filter(flown):
     assert flown.smoothed is not None
-    smoothed, filtered = EstimateRow.of(flown.smoothed), flown.said
+    smoothed, filtered = EstimateRow.of(flown.smoothed), flown.estimate_rows
     assert (smoothed.t_s == filtered.t_s).all()
     assert all(np.isfinite(getattr(smoothed, name)).all() for name in UNPROTECTED)
     assert (smoothed.std_pos_ned_m <= filtered.std_pos_ned_m * (1.0 + 1e-9)).all()

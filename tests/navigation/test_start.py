@@ -14,6 +14,7 @@ from flownav.core.measurement import Sensor
 from flownav.estimation.motion import predict
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, IMU, VELOCITY
 from flownav.navigation.before_start import felt, levelled
+from flownav.navigation.kernel_settings import FROM_MAG, NO_HEADING, Equipment
 from flownav.navigation.records import Reading, StartMemory
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import RECTIFIED_SHARE
@@ -28,7 +29,6 @@ from flownav.navigation.start import (
     starts,
     tie_tilt,
 )
-from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
 from navigation_streams import Navigated, fly, navigate, still
 
 NAN = math.nan
@@ -190,7 +190,7 @@ def test_a_vehicle_on_a_slope_starts_aslant_and_what_is_left_covers_the_truth(sh
     )
     tilted = (GRAVITY_M_S2 * STANDING_TILT_RAD) ** 2
     believed = tilted / (tilted + lasting + noise)
-    first = run.said
+    first = run.estimate_rows
     assert angles(first.quaternion[0])[0] == pytest.approx(believed * roll, rel=0.1, abs=2e-3)
     bias = -lasting / (tilted + lasting + noise) * GRAVITY_M_S2 * math.sin(roll)
     assert run.column(ACCEL_BIAS + 1)[0, 0] == pytest.approx(bias, rel=0.2, abs=5e-3)

@@ -9,6 +9,7 @@ import pytest
 
 from flownav.core.compile import ONE_LANE
 from flownav.navigation.attitude import AttitudeVariance
+from flownav.navigation.kernel_settings import NO_HEADING, Equipment
 from flownav.navigation.memory import MEMORY, STILL_CLOCK, new_work, set_lane, store_reading
 from flownav.navigation.motion_records import ImuMemory, ImuWindow, SeenWindow, StandMemory
 from flownav.navigation.reasons import FUSED, SILENT
@@ -25,7 +26,6 @@ from flownav.navigation.still import (
     offer_rest,
     stand_turning,
 )
-from flownav.navigation.told import NO_HEADING, Equipment
 from flownav.navigation.usual import LOST_TILT_RAD, USUAL_TILT_RAD, offer_level
 from flownav.navigation.verdicts import AxisBias, AxisVelocity
 from flownav.navigation.windows import (

@@ -10,11 +10,11 @@ import pytest
 from flownav.core.compile import ONE_LANE
 from flownav.estimation.states import INNOVATION, INNOVATION_VARIANCE, NOISE
 from flownav.navigation.flow_noise import LARGEST_CHANGE, LARGEST_EXCESS, MEAN_CHANGE, SMALLEST_EXCESS, followed_excess
+from flownav.navigation.kernel_settings import NO_HEADING, Equipment
 from flownav.navigation.memory import MEMORY, REASON, load_whiteness, new_work
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE, OUT_OF_RANGE, SILENT
 from flownav.navigation.records import EchoMemory, FlowMemory, NoiseMemory, WhitenessMemory
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.told import NO_HEADING, Equipment
 from flownav.navigation.trust import (
     FACTOR_PACE,
     FIRST_READINGS,

@@ -14,14 +14,14 @@ from flownav.api.replaying import replay
 from flownav.core.compile import equation, replacing
 from flownav.core.errors import InputError
 from flownav.core.record import QUATERNION
-from flownav.parts.equations import EquationFilter, EquationVehicle, Said
+from flownav.parts.equations import EquationEstimate, EquationFilter, EquationVehicle
 from flownav.parts.examples.equation_filter import Memory, equation_filter, say, step
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario
 from flownav.vehicle.helicopter import derivative, outputs
 
 SHORT = {"duration_s": 8.0}
-with_north = replacing(Said, "pos_n")
+with_north = replacing(EquationEstimate, "pos_n")
 PATH = ("pos_n_m", "pos_e_m", "pos_d_m", "vel_u_m_s", "vel_v_m_s", "vel_w_m_s", *QUATERNION)
 START = assemble(load_scenario("landing")).flight.plan.start
 VEHICLE = assemble(load_scenario("landing")).flight.vehicle

@@ -36,7 +36,7 @@ def known(log):
 
 
 def said(log: Log) -> EstimateRow:
-    return replay(log, ReplayOptions(), NavigatorSettingsFile()).said
+    return replay(log, ReplayOptions(), NavigatorSettingsFile()).estimate_rows
 
 
 def at_common_times(one: EstimateRow, other: EstimateRow, shift_s: float = 0.0) -> tuple[EstimateRow, EstimateRow]:

@@ -41,7 +41,7 @@ def flown(log: Log, settings=None, **options) -> Replay:
 
 def error_of(run: Replay, flight: SyntheticLog) -> np.ndarray:
     """Estimate minus truth: position and NED velocity (n, 6)."""
-    t_s = run.said.t_s
+    t_s = run.estimate_rows.t_s
     truth = np.column_stack([flight.position, flight.velocity])
     return run.estimate[:, [1, 2, 3, 17, 18, 19]] - np.column_stack([np.interp(t_s, flight.t_s, c) for c in truth.T])
 
@@ -88,7 +88,7 @@ def test_other_rates_clocks_and_sensors_find_it_too(tmp_path, rates):
     error = np.abs(error_of(run, flight))
     assert error[:, :2].max() < 0.05
     assert error[:, 2].max() < 0.06
-    assert error[run.said.t_s > start + 4.0, 2].max() < 0.02  # the ground is found
+    assert error[run.estimate_rows.t_s > start + 4.0, 2].max() < 0.02  # the ground is found
 
 
 def test_without_flow_the_same_cut_is_lost(log, flight):
@@ -108,7 +108,7 @@ def test_flow_scale_acts_on_its_axis_alone(log, scale, axis):
     trusting = NavigatorSettingsFile(flow_scale_sigma=0.0)
     plain_run = flown(log, trusting, gps_outages_s=CUT)
     scaled = flown(log, trusting, gps_outages_s=CUT, flow_scale=scale)
-    late = plain_run.said.t_s > 30.0
+    late = plain_run.estimate_rows.t_s > 30.0
     slopes = [
         np.polyfit(plain_run.estimate[late, 4 + column], scaled.estimate[late, 4 + column], 1)[0] for column in (1, 0)
     ]
@@ -160,7 +160,7 @@ def test_range_spikes_and_gaps_are_ridden_out(log, flight):
                        quality=stream.quality[keep])  # fmt: skip
     run = flown(hurt, gps_outages_s=CUT)
     assert np.abs(error_of(run, flight))[:, :2].max() < 0.15
-    assert np.abs(error_of(run, flight))[run.said.t_s > 4.0, 2].max() < 0.03
+    assert np.abs(error_of(run, flight))[run.estimate_rows.t_s > 4.0, 2].max() < 0.03
     assert len(run.written.event[EventRow.of(run.written.event).kind == 2]) == 0  # no new ground
     offered = run.offered
     taken = (offered.sensor == Sensor.RANGE) & (offered.reason == Reason.FUSED)
@@ -261,28 +261,28 @@ def test_a_single_gps_glitch_is_gated(log, flight):
 @pytest.mark.parametrize("gone", [(Sensor.IMU,), (Sensor.BARO, Sensor.MAG), (Sensor.GPS_VELOCITY,)])
 def test_sensors_that_are_missing_cost_little(log, flight, gone):
     run = flown(without(log, *gone), gps_outages_s=CUT)
-    late = run.said.t_s > 12.0
+    late = run.estimate_rows.t_s > 12.0
     assert np.abs(error_of(run, flight))[late, :2].max() < 0.25
 
 
 def test_a_slow_imu_is_as_good_as_none_and_no_worse(log, flight):
     run = flown(thinned(log, Sensor.IMU, 25), gps_outages_s=CUT)
-    assert np.abs(error_of(run, flight))[run.said.t_s > 12.0, :2].max() < 0.25
+    assert np.abs(error_of(run, flight))[run.estimate_rows.t_s > 12.0, :2].max() < 0.25
 
 
 def test_without_gps_the_filter_starts_with_the_flow_at_the_local_origin(log, flight):
     run = flown(without(log, Sensor.GPS_POSITION, Sensor.GPS_VELOCITY))
-    assert run.said.pos_ned_m[0, :2] == pytest.approx([0, 0], abs=0.01)
+    assert run.estimate_rows.pos_ned_m[0, :2] == pytest.approx([0, 0], abs=0.01)
     assert np.abs(error_of(run, flight))[:, :2].max() < 0.1  # blind below 0.3 m, with a first tilt known to 2 degrees
-    assert np.abs(error_of(run, flight))[run.said.t_s > 12.0, :2].max() < 0.05
+    assert np.abs(error_of(run, flight))[run.estimate_rows.t_s > 12.0, :2].max() < 0.05
     assert run.scores()["velocity_rms_m_s"] is None
     assert run.scores()["outages"] == []
 
 
 def test_a_cut_from_the_start_still_starts(log, flight):
     run = flown(log, gps_outages_s=((-1.0, 30.0),))
-    assert run.said.t_s[0] == pytest.approx(NavigatorSettingsFile().start_wait_s, abs=0.5)
-    assert np.abs(error_of(run, flight))[run.said.t_s > 50.0, :2].max() < 0.5
+    assert run.estimate_rows.t_s[0] == pytest.approx(NavigatorSettingsFile().start_wait_s, abs=0.5)
+    assert np.abs(error_of(run, flight))[run.estimate_rows.t_s > 50.0, :2].max() < 0.5
 
 
 def test_flow_without_range_is_rejected_for_want_of_height(log):
@@ -405,7 +405,7 @@ def test_every_state_of_the_filter_is_in_the_record_with_its_deviation(log):
     states, estimate = record.tables["states"], record.tables["estimate"]
     assert ("t_s", *TABLES["states"]) == tuple(states)
     assert (states["t_s"] == estimate["t_s"]).all()
-    said, baro = run.said, FILTER_STATES.index("baro_m")
+    said, baro = run.estimate_rows, FILTER_STATES.index("baro_m")
     assert (states["baro_m"] == said.states[:, baro]).all()
     assert (states["std_baro_m"] == said.std_states[:, baro]).all()
     assert states["baro_m"][-1] == pytest.approx(12.0, abs=0.5)

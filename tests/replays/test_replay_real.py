@@ -95,7 +95,7 @@ def test_stated_uncertainty_is_honest_through_the_outages(outdoor, cuts):
     """
     for (t0, t1), cut in zip(WINDOWS, cuts, strict=True):
         run = replay(outdoor, ReplayOptions(gps_outages_s=((t0, t1),)), NavigatorSettingsFile())
-        last = run.estimate[np.searchsorted(run.said.t_s, t1 - 0.5)]
+        last = run.estimate[np.searchsorted(run.estimate_rows.t_s, t1 - 0.5)]
         assert run.outage(t0, t1) == cut
         assert cut.horizontal_max_m < 3.0 * np.hypot(last[11], last[12]) + 0.5
 

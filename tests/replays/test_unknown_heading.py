@@ -54,15 +54,15 @@ def test_all_of_36_headings_are_found_within_3_m_and_2_deg(unheaded, flight):
         run = replay(turned(unheaded, float(by_rad)), ReplayOptions(), NavigatorSettingsFile())
         (found,) = [event for event in run.written.event if event[1] == HEADING_FOUND]
         assert np.interp(found[0], flight.t_s, way_m) < 3.0
-        t_s = run.said.t_s
+        t_s = run.estimate_rows.t_s
         error = yaw_of(run.estimate) - FIRST_YAW_RAD - YAW_RATE_RAD_S * t_s - by_rad
         error = np.abs((error + np.pi) % (2.0 * np.pi) - np.pi)
         assert np.degrees(error[t_s > found[0] + 0.1].max()) < 2.5  # 2.1 of the worst
         cosine, sine = np.cos(by_rad), np.sin(by_rad)
         north, east = (np.interp(t_s, flight.t_s, column) for column in flight.position[:, :2].T)
         off_m = np.hypot(
-            run.said.pos_ned_m[:, 0] - cosine * north + sine * east,
-            run.said.pos_ned_m[:, 1] - sine * north - cosine * east,
+            run.estimate_rows.pos_ned_m[:, 0] - cosine * north + sine * east,
+            run.estimate_rows.pos_ned_m[:, 1] - sine * north - cosine * east,
         )
         assert off_m.max() < 0.8  # 0.63 of the worst
 
@@ -103,7 +103,7 @@ def magnet_turned(log, by_rad: float):
 
 
 def heading_error(run, by_rad: float) -> np.ndarray:
-    error = yaw_of(run.estimate) - FIRST_YAW_RAD - YAW_RATE_RAD_S * run.said.t_s - by_rad
+    error = yaw_of(run.estimate) - FIRST_YAW_RAD - YAW_RATE_RAD_S * run.estimate_rows.t_s - by_rad
     return np.degrees(np.abs((error + np.pi) % (2.0 * np.pi) - np.pi))
 
 
@@ -117,7 +117,7 @@ def test_a_compass_that_is_90_deg_wrong_is_refuted_whatever_the_heading(compasse
         (refuted,), (found,) = events[events[:, 1] == COMPASS_REFUTED], events[events[:, 1] == HEADING_FOUND]
         assert refuted[0] < found[0]
         assert np.interp(found[0], flight.t_s, way_m) < 3.5
-        assert heading_error(run, by_rad)[run.said.t_s > found[0] + 0.1].max() < 8.0
+        assert heading_error(run, by_rad)[run.estimate_rows.t_s > found[0] + 0.1].max() < 8.0
         mag = run.innovation[run.offered.sensor == Sensor.MAG]
         assert (mag[mag[:, 0] > refuted[0], 8] == Reason.NO_HEADING).all()
 

@@ -14,7 +14,7 @@ def spoken(sensor: Sensor, t0: float, t1: float) -> Stream:
     return Stream.of(sensor, t_s, np.zeros((20, len(COLUMNS[sensor]))))
 
 
-def said_of(t0: float, t1: float, span: tuple[float, float], sensor: Sensor = Sensor.RANGE) -> list[str]:
+def learnt_of(t0: float, t1: float, span: tuple[float, float], sensor: Sensor = Sensor.RANGE) -> list[str]:
     return silences({sensor: spoken(sensor, t0, t1)}, span)
 
 
@@ -24,8 +24,8 @@ def test_coverage_is_the_first_and_last_reading_by_name():
 
 
 def test_a_sensor_that_falls_silent_is_named_with_both_times():
-    assert said_of(0.0, 31.2, (0.0, 60.0)) == ["range ends at 31.2 s of 60.0 s"]
-    assert said_of(12.0, 60.0, (0.0, 60.0)) == ["range starts at 12.0 s of 60.0 s"]
+    assert learnt_of(0.0, 31.2, (0.0, 60.0)) == ["range ends at 31.2 s of 60.0 s"]
+    assert learnt_of(12.0, 60.0, (0.0, 60.0)) == ["range starts at 12.0 s of 60.0 s"]
 
 
 @pytest.mark.parametrize(("t0", "t1", "span", "lines"), [
@@ -37,12 +37,12 @@ def test_a_sensor_that_falls_silent_is_named_with_both_times():
     (1004.0, 1058.0, (1000.0, 1060.0), 0),
 ])  # fmt: skip
 def test_five_seconds_and_five_percent_are_needed(t0, t1, span, lines):
-    assert len(said_of(t0, t1, span)) == lines
+    assert len(learnt_of(t0, t1, span)) == lines
 
 
 @pytest.mark.parametrize("sensor", [Sensor.LANDED, Sensor.PAD])
 def test_what_speaks_only_when_there_is_something_to_say_is_not_missed(sensor):
-    assert said_of(20.0, 25.0, (0.0, 60.0), sensor) == []
+    assert learnt_of(20.0, 25.0, (0.0, 60.0), sensor) == []
 
 
 def spoken_by(**spans: tuple[float, float]) -> list[str]:
@@ -63,8 +63,8 @@ def test_of_two_the_longer_one_is_the_log():
 
 
 def test_half_of_a_short_log_is_missed_too():
-    assert said_of(0.0, 4.0, (0.0, 8.0)) == ["range ends at 4.0 s of 8.0 s"]
-    assert said_of(0.0, 7.0, (0.0, 8.0)) == []
+    assert learnt_of(0.0, 4.0, (0.0, 8.0)) == ["range ends at 4.0 s of 8.0 s"]
+    assert learnt_of(0.0, 7.0, (0.0, 8.0)) == []
 
 
 @pytest.mark.parametrize(("gaps", "words"), [

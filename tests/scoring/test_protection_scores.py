@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.scoring.reference import Drift, exceeded_unsaid, protection_of
+from flownav.scoring.reference import Drift, protection_of, unwarned_share
 
 T_S = np.arange(0.0, 10.0, 1.0)
 LEVELS_M = np.column_stack([np.full(10, 2.0), np.full(10, 1.0)])
@@ -19,19 +19,19 @@ def drift(*horizontal_m: float) -> Drift:
 
 def test_the_share_is_of_instants_that_are_beyond_and_not_flagged():
     off = drift(0.0, 3.0, 1.9, 2.1)
-    assert exceeded_unsaid(T_S, LEVELS_M[:, 0], QUIET, off) == 0.5
+    assert unwarned_share(T_S, LEVELS_M[:, 0], QUIET, off) == 0.5
     said = QUIET.copy()
     said[1] = True
-    assert exceeded_unsaid(T_S, LEVELS_M[:, 0], said, off) == 0.25
+    assert unwarned_share(T_S, LEVELS_M[:, 0], said, off) == 0.25
 
 
 def test_a_level_that_is_no_number_protects_from_nothing():
-    assert exceeded_unsaid(T_S, np.full(10, np.nan), QUIET, drift(0.0, 0.1)) == 1.0
+    assert unwarned_share(T_S, np.full(10, np.nan), QUIET, drift(0.0, 0.1)) == 1.0
 
 
 def test_the_newest_level_counts():
     rising = np.arange(10.0)
-    assert exceeded_unsaid(T_S, rising, QUIET, drift(0.5, 0.5, 1.5)) == pytest.approx(1.0 / 3.0)
+    assert unwarned_share(T_S, rising, QUIET, drift(0.5, 0.5, 1.5)) == pytest.approx(1.0 / 3.0)
 
 
 def test_median_95_percent_and_the_flagged_share():

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from flownav.campaigns.local import takeoff_history
 from flownav.cli import app
-from flownav.cli.fly_said import takeoff_lines
+from flownav.cli.fly_output import takeoff_lines
 from flownav.scoring.landings import takeoff_of_flight, takeoff_of_flights, takeoffs
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_one

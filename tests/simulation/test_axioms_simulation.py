@@ -12,7 +12,7 @@ from flownav.sensors.geometry import LEVEL, Ground
 from flownav.simulation.fitting import Timing, clocks, sampled_readings, schedule_of
 from flownav.simulation.ground import RecirculationSettings, RecirculationState, recirculated, share_beyond, under_rotor
 from flownav.simulation.onboard import EPOCH_S, Clock
-from flownav.simulation.truth import CARRIED
+from flownav.simulation.truth import SENSOR_TABLE
 from flownav.simulation.wind import WindNormals, WindSettings, WindState, WindVelocity, start_wind, step_wind
 
 SEEDS = pytest.mark.parametrize("seed", range(6))
@@ -119,7 +119,7 @@ def test_far_beyond_an_edge_a_rotor_finds_the_step_and_far_before_it_nothing(ste
 
 # -- the timetable -------------------------------------------------------------------------------------------------
 ONBOARD = SimpleNamespace(
-    carried=SimpleNamespace(**{sensor.name: SimpleNamespace(clock=Clock(9, 5, 2)) for sensor in CARRIED}),
+    carried=SimpleNamespace(**{sensor.name: SimpleNamespace(clock=Clock(9, 5, 2)) for sensor in SENSOR_TABLE}),
     inertial_steps=2,
 )
 KINDS = {kind for kind, _, _ in clocks(ONBOARD)}  # type: ignore[arg-type]

@@ -221,7 +221,7 @@ def test_a_navigated_record_has_its_own_attitude_its_consistency_its_gate_and_wh
     record = fly_recorded(landing, 11, 4)
     assert np.allclose(sum(record.tables["estimate"][name] ** 2 for name in QUATERNION), 1.0)
     rows = record.tables["innovation"]
-    gate = landing.fitted.told.settings.gate_sigma
+    gate = landing.fitted.given.settings.gate_sigma
     known = np.isfinite(rows["test_ratio"])
     ratio = rows["innovation"] ** 2 / (gate**2 * rows["innovation_variance"])
     assert rows["test_ratio"][known] == pytest.approx(ratio[known])

@@ -11,10 +11,10 @@ from typer.testing import CliRunner
 from flownav.campaigns.local import fly_recorded
 from flownav.cli import app
 from flownav.control.autopilot import hovering
-from flownav.control.design import gains_for, told_before
+from flownav.control.design import gains_for, nominal_model
 from flownav.control.guidance import Knowledge
 from flownav.control.learning import AGAIN_EPOCHS, LONGEST_EPOCHS, TRIES, Learnt
-from flownav.control.learnt_gains import as_told
+from flownav.control.learnt_gains import loop_gains_of
 from flownav.control.learnt_margins import SIDED_95, margins_of_record
 from flownav.control.margins import LEAST_GAIN_DB, LEAST_PHASE_DEG
 from flownav.core.compile import LANES
@@ -37,9 +37,9 @@ HIGH = Estimated(0.0, 0.0, -5.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 FLIES = hovering(GAINS)._replace(pitch_sine=0.0, roll_sine=0.0)
 
 
-def minded(before=NOTHING, autopilot=FLIES, said=HIGH, known=KNOWS, passed=10):
+def minded(before=NOTHING, autopilot=FLIES, stated=HIGH, known=KNOWS, passed=10):
     """One epoch of a vehicle that may learn."""
-    return mind.law(before, autopilot, said, HOME, known, gains=GAINS, passed=passed)
+    return mind.law(before, autopilot, stated, HOME, known, gains=GAINS, passed=passed)
 
 
 def test_it_counts_the_epochs_of_a_stir_and_a_landing_waits_for_it():
@@ -133,8 +133,8 @@ def test_what_it_learns_is_its_own_vehicle_within_what_it_says(approach):
     off, said = [], []
     for (learnt, gains), truth in zip(flown.learnt, truths, strict=True):
         assert learnt.state == 1.0
-        assert gains != as_told(approach.flight.gains)
-        own = told_before(truth.vehicle, trim(truth.vehicle), -1)
+        assert gains != loop_gains_of(approach.flight.gains)
+        own = nominal_model(truth.vehicle, trim(truth.vehicle), -1)
         lag = 1.0 / own.flap_rate_1_s + 2.0 * own.servo_damping / own.servo_rad_s
         true = np.array([own.pitch_stiffness_1_s2, own.roll_stiffness_1_s2, lag])
         off.append(np.log(np.array([learnt.pitch_stiffness_1_s2, learnt.roll_stiffness_1_s2, learnt.lag_s]) / true))

@@ -15,8 +15,8 @@ from flownav.navigation.memory import new_work
 from flownav.navigation.records import GroundMemory, Reading, StartMemory, SuspicionMemory
 from flownav.simulation.epoch import feel, put_home
 from flownav.simulation.navigating import compare_at_horizon, find_place, hand_to_autopilot, note_knowledge, note_truth
+from flownav.simulation.navigator_view import GroundEstimate, PadEstimate, PadVariance, StatedVariance
 from flownav.simulation.records import Estimated, Felt, Loads, PadPlace
-from flownav.simulation.said import GroundSaid, PadSaid, PadVariance, StatedVariance
 from flownav.simulation.sensing import motion_of, true_imu
 from flownav.vehicle.state import CALM, HelicopterState
 from packed_covariance import pack
@@ -70,7 +70,7 @@ def test_errors_at_the_horizon_are_said_once_the_navigator_runs_and_the_horizon_
 
 
 def test_the_pad_is_where_camera_and_range_say_and_else_where_it_was_noted():
-    pad, ground, below = PadSaid(1.0, 4.0, 5.0), GroundMemory(known=1.0), GroundSaid(6.0)
+    pad, ground, below = PadEstimate(1.0, 4.0, 5.0), GroundMemory(known=1.0), GroundEstimate(6.0)
     assert find_place.law(NO_PLACE, pad, ground, below) == (4.0, 5.0, 6.0)
     assert find_place.law(NO_PLACE, pad._replace(known=0.0), ground, below) == (0.5, 0.25, 6.0)
     assert find_place.law(NO_PLACE, pad, ground._replace(known=0.0), below) == (4.0, 5.0, 0.125)
@@ -101,16 +101,18 @@ def test_home_is_what_the_estimate_has_beyond_the_path():
 def test_a_vehicle_knows_its_place_over_the_pad_by_the_worse_axis():
     before, quiet = Knowledge(0.0, 0.0, 1.0, 0.0, 0.0), SuspicionMemory()
     variance, ground = PadVariance(1.0, 4.0, 9.0, 0.25), GroundMemory(known=1.0)
-    found = note_knowledge.law(before, CALM, PadSaid(1.0, 0.0, 0.0), variance, ground, quiet)
+    found = note_knowledge.law(before, CALM, PadEstimate(1.0, 0.0, 0.0), variance, ground, quiet)
     assert found == (1.0, 1.0, pytest.approx(1.02), 3.0, 0.0, 0.0)
-    unseen = note_knowledge.law(before, CALM, PadSaid(0.0, 0.0, 0.0), variance, ground, quiet._replace(suspected=2.0))
+    unseen = note_knowledge.law(
+        before, CALM, PadEstimate(0.0, 0.0, 0.0), variance, ground, quiet._replace(suspected=2.0)
+    )
     assert unseen == (0.0, 1.0, pytest.approx(1.02), 2.0, 1.0, 0.0)
-    lost = note_knowledge.law(before, CALM, PadSaid(1.0, 0.0, 0.0), variance._replace(over_n_m2=nan), ground, quiet)
+    lost = note_knowledge.law(before, CALM, PadEstimate(1.0, 0.0, 0.0), variance._replace(over_n_m2=nan), ground, quiet)
     assert lost.sigma_m == inf
     cut = CALM._replace(engine=0.0)
-    told = note_knowledge.law(lost, cut, PadSaid(1.0, 0.0, 0.0), variance, ground, quiet)
+    told = note_knowledge.law(lost, cut, PadEstimate(1.0, 0.0, 0.0), variance, ground, quiet)
     assert told.powerless_s == pytest.approx(0.02)  # as the speed controller tells, epoch by epoch
-    assert note_knowledge.law(told, cut, PadSaid(1.0, 0.0, 0.0), variance, ground, quiet).powerless_s > 0.03
+    assert note_knowledge.law(told, cut, PadEstimate(1.0, 0.0, 0.0), variance, ground, quiet).powerless_s > 0.03
 
 
 def test_the_normalised_error_is_that_of_the_joint_form():

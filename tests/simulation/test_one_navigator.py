@@ -11,11 +11,11 @@ from flownav.core.compile import LANES, ONE_LANE
 from flownav.core.record import Record
 from flownav.estimation.states import MOST_SOURCES, SCRATCH
 from flownav.logs.open_log import open_flight
+from flownav.navigation.kernel_settings import Equipment
 from flownav.navigation.loop import run, start_navigator
 from flownav.navigation.memory import WORK_ROWS
 from flownav.navigation.tables import estimate_table, innovation_table, states_table
 from flownav.navigation.tape import empty_tape
-from flownav.navigation.told import Equipment
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
@@ -73,7 +73,7 @@ def test_all_that_the_navigator_remembers_in_the_end_is_the_same_bits(flown, lan
     log = open_flight(path)
     _, settings = as_fed(log, ReplayOptions(), None)
     (segment,) = log.fed
-    noise = setup.fitted.told.noise
+    noise = setup.fitted.given.noise
     running = start_navigator(Equipment(**segment.equipment), settings, empty_tape(4000, 40_000, 20_000), noise)
     run(segment.queue, running)
     remembered = np.ones(WORK_ROWS, np.bool_)

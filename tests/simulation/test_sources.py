@@ -7,13 +7,13 @@ import pytest
 
 from flownav.simulation import layout
 from flownav.simulation.assemble import assemble
-from flownav.simulation.carried import carried_sensors, carry
 from flownav.simulation.layout import in_pairs
 from flownav.simulation.noise import CHANNELS_PER_STEP, normal_pair
 from flownav.simulation.plan import ATTITUDE_STEPS, PHYSICS_STEPS
 from flownav.simulation.scenario import load_scenario, with_filter
+from flownav.simulation.sensor_table import carry, sensor_rows
 from flownav.simulation.sources import normals_of, sources_of, starts_of
-from flownav.simulation.truth import CARRIED
+from flownav.simulation.truth import SENSOR_TABLE
 
 
 @pytest.fixture(scope="module", params=[("landing", "paper"), ("gusty", "paper"), ("approach", "landing")])
@@ -51,7 +51,7 @@ def test_what_is_not_carried_has_no_noise():
 def test_no_two_draws_of_an_epoch_share_a_channel():
     parts = ATTITUDE_STEPS * PHYSICS_STEPS  # the most inertial readings that an epoch has
     taken = [*range(40)]  # of wind, recirculation and the paper's sensors
-    for sensor in CARRIED:
+    for sensor in SENSOR_TABLE:
         times = 1 if sensor.on_epochs else parts
         taken += range(sensor.channels.reading, sensor.channels.reading + times * in_pairs(sensor.normals) // 2)
         taken += range(sensor.channels.fault, sensor.channels.fault + 3 * times * len(sensor.says))
@@ -63,7 +63,7 @@ def test_no_two_draws_before_a_flight_share_a_channel():
     for record in ("unit", "begun"):
         taken = [
             channel
-            for sensor in CARRIED
+            for sensor in SENSOR_TABLE
             for channel in range(sensor.channels.start, sensor.channels.start + in_pairs(getattr(sensor, record)) // 2)
         ]
         assert len(set(taken)) == len(taken)
@@ -72,5 +72,5 @@ def test_no_two_draws_before_a_flight_share_a_channel():
 
 def test_what_is_carried_is_known_once_the_simulator_is_there():
     with pytest.raises(RuntimeError, match="barometer: what vehicles carry is known"):
-        carry(next(sensor for sensor in CARRIED if sensor.name == "barometer"))
-    assert carried_sensors() == CARRIED
+        carry(next(sensor for sensor in SENSOR_TABLE if sensor.name == "barometer"))
+    assert sensor_rows() == SENSOR_TABLE

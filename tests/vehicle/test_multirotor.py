@@ -16,7 +16,7 @@ from flownav.core.parameter_files import read_toml
 from flownav.vehicle import airframe, multirotor
 from flownav.vehicle.feasibility import require_multirotor
 from flownav.vehicle.kinds import flattened, load_vehicle, read_kind, vehicle_file
-from flownav.vehicle.motors import battery_voltage, mixed, propeller_load, root_of_share, told_speed
+from flownav.vehicle.motors import battery_voltage, commanded_speed, mixed, propeller_load, root_of_share
 from flownav.vehicle.parameters import (
     MultirotorParameters,
     VehicleParameters,
@@ -86,7 +86,7 @@ def test_each_control_moves_what_its_name_says():
 def test_a_motor_follows_its_command_as_a_first_order_lag():
     vehicle = QUAD._replace(resistance_ohm=0.0)  # else the voltage sags as it speeds up
     start = settled(-HIGH_M, (0.0, 0.0, 0.0), 0.0, 0.0, [300.0] * 4)
-    told = told_speed(root_of_share(0.5), battery_voltage(0.0, 0.0, vehicle), vehicle)
+    told = commanded_speed(root_of_share(0.5), battery_voltage(0.0, 0.0, vehicle), vehicle)
     state, dt = start, 0.0005
     for _ in range(100):
         state = multirotor.step(state, Controls(0.0, 0.0, 0.5, 0.0), CALM, dt, False, vehicle)

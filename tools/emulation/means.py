@@ -48,6 +48,6 @@ def means_apart(settings: Array, rates: Rates, lag: bool, readings: Sequence[Giv
         inertial += given.sensor == Sensor.IMU
         if given.sensor == Sensor.IMU and inertial % EVERY == 1:  # both have read up to here
             told = whole.now(given.t_s), coarse.now(given.t_s)
-            if all(each.status == progress.TOLD for each in told):
+            if all(each.status == progress.STATE_GIVEN for each in told):
                 found.append(apart(*told))
     return np.array([np.median(found, axis=0), np.max(found, axis=0)])

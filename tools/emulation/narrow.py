@@ -39,6 +39,6 @@ def worst(settings: Array, rates: Rates, lag: bool, readings: Sequence[Given], k
         count += given.sensor == Sensor.IMU
         if given.sensor == Sensor.IMU and count % EVERY == 0:
             told = whole.now(given.t_s), narrow.now(given.t_s)
-            if all(each.status == progress.TOLD for each in told):
+            if all(each.status == progress.STATE_GIVEN for each in told):
                 found = np.fmax(found, apart(*told))
     return found

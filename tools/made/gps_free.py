@@ -18,7 +18,7 @@ from flownav.replays.judged import airborne_of
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
 from flownav.scoring.path import motion_of, truth_motion
-from flownav.scoring.reference import drift_of, exceeded_unsaid
+from flownav.scoring.reference import drift_of, unwarned_share
 from made.flight import Table
 from made.judging import Line, line_of
 from made.reckoning import reckoned
@@ -83,10 +83,10 @@ def row_of(name: str, log: Log) -> Row | None:
     drift = drift_of(estimate, truth, flight)
     if drift is None:
         return None
-    stated, level = flown.said, flown.said.protection_m[:, 0]
+    stated, level = flown.estimate_rows, flown.estimate_rows.protection_m[:, 0]
     inside = (stated.t_s >= flight[0]) & (stated.t_s <= flight[1])
     warned = flagged(stated.t_s, flags_of(flown.written.event))
-    unsaid = exceeded_unsaid(stated.t_s, level, warned, drift)
+    unsaid = unwarned_share(stated.t_s, level, warned, drift)
     ours, line = (line_of(path, truth, flight) for path in (estimate, reckoned(tables_of(log))))
     return Row(name, ours, line, float(np.median(level[inside])), float(unsaid))
 

@@ -17,7 +17,7 @@ from flownav.replays.judged import TESTED
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import Replay, replay
 from flownav.scoring.path import motion_of
-from flownav.scoring.reference import Motion, Window, drift_of, exceeded_unsaid
+from flownav.scoring.reference import Motion, Window, drift_of, unwarned_share
 from made.flight import Made, Truth, heading_of, into_body, write
 from made.reckoning import reckoned
 from made.signs import Errors, signs_of
@@ -87,7 +87,7 @@ def _verdict(made: Made, flown: Replay, truth: Motion, line: Line, path_m: float
     estimate = motion_of(flown.table)
     window = window_of(made.truth)
     drift = drift_of(estimate, truth, window)
-    said = flown.said
+    said = flown.estimate_rows
     inside = (said.t_s >= window[0]) & (said.t_s <= window[1])
     if drift is None or not inside.any():
         return _lost(made, line, path_m, "no estimate in flight")
@@ -96,7 +96,7 @@ def _verdict(made: Made, flown: Replay, truth: Motion, line: Line, path_m: float
     errors = errors_of(flown, made.truth)
     return Verdict(
         made.name, made.number, path_m, line_of(estimate, truth, window), line,
-        float(np.median(level[inside])), exceeded_unsaid(said.t_s, level, warned, drift), float(warned[inside].mean()),
+        float(np.median(level[inside])), unwarned_share(said.t_s, level, warned, drift), float(warned[inside].mean()),
         nis(flown, FLOW, window), nis(flown, (Sensor.RANGE,), window), errors.squares, signs_of(errors, flown, drift),
     )  # fmt: skip
 
@@ -144,7 +144,7 @@ def nis(flown: Replay, sensors: tuple[Sensor, ...], window: tuple[float, float])
 
 def errors_of(flown: Replay, truth: Truth) -> Errors:
     """The errors of the estimate in flight; position and heading from take-off on."""
-    said = flown.said
+    said = flown.estimate_rows
     rows = (said.t_s >= truth.take_off_s) & (said.t_s <= truth.landing_s)
     at = np.clip(np.searchsorted(truth.t_s, said.t_s[rows]), 0, len(truth.t_s) - 1)
     quaternion, ours = truth.quaternion[at], said.quaternion[rows]

@@ -62,14 +62,14 @@ def since(t_s: Array, wrong: np.ndarray) -> float | None:
 
 def _unsure(flown: Replay, begin_s: float) -> list[str]:
     """That the position was not known at take-off."""
-    said = flown.said
+    said = flown.estimate_rows
     stated_m = float(said.std_pos_ned_m[min(int(np.searchsorted(said.t_s, begin_s)), len(said.t_s) - 1), 0])
     return [f"position stated to {stated_m:.1f} m at take-off"] if stated_m > UNSURE_M else []
 
 
 def _moved(flown: Replay, begin_s: float, end_s: float) -> list[str]:
     """Gyro biases that moved in flight."""
-    said = flown.said
+    said = flown.estimate_rows
     at = [int(np.searchsorted(said.t_s, t_s)) for t_s in (begin_s, begin_s + LATER_S, end_s)]
     values = said.states[np.minimum(at, len(said.t_s) - 1), :3]
     return [

@@ -109,8 +109,8 @@ def flight_of(
     noise = options.flow_noise
     if sensor is not None or settings is not None:
         own = load(Path(settings), NavigatorSettingsFile) if settings is not None else None
-        told = settings_of(load_sensor(Path(sensor)) if sensor is not None else None, stated=own)
-        stated, noise = told.settings, told.noise
+        given = settings_of(load_sensor(Path(sensor)) if sensor is not None else None, stated=own)
+        stated, noise = given.settings, given.noise
     longest = max(segments_of(log, options, stated), key=lambda segment: len(segment.queue.t_s))
     return Flight(name, longest, stated, noise, options.gps_delay_s)
 
@@ -133,25 +133,25 @@ def verify(what: str | Path, record: str | Path | None = None, *, horizon_s: flo
     """
     from flownav.export.onboard.interface import Rates
     from flownav.export.onboard.package import manifest_of, readings_of
-    from flownav.export.onboard.verify import Said, board_for, changed_files, compare, said_by, verified
+    from flownav.export.onboard.verify import LoggedDigest, board_for, changed_files, compare, logged_digests, verified
 
     folder = Path(what)
     if not folder.is_dir():
-        said, flight = said_by(str(what)), flight_of(record)
-        found = verified(said, flight, _rates(flight, 0.27 if horizon_s is None else horizon_s))
-        return _told(str(what), found, [])
+        logged, flight = logged_digests(str(what)), flight_of(record)
+        found = verified(logged, flight, _rates(flight, 0.27 if horizon_s is None else horizon_s))
+        return _facts_of(str(what), found, [])
     manifest = manifest_of(folder)
     changed = list(changed_files(folder, manifest))
     rates, flight = Rates(**manifest["rates"]), flight_of(record)
     every = 50
-    said = [Said((i + 1) * every, int(digest, 16)) for i, digest in enumerate(manifest["digests"])]
+    logged = [LoggedDigest((i + 1) * every, int(digest, 16)) for i, digest in enumerate(manifest["digests"])]
     found = compare(
-        said, readings_of(flight)[: len(said) * every], board_for(flight, rates, tuple(manifest["without"]))
+        logged, readings_of(flight)[: len(logged) * every], board_for(flight, rates, tuple(manifest["without"]))
     )
-    return _told(str(what), found, changed)
+    return _facts_of(str(what), found, changed)
 
 
-def _told(what: str, found: "Found", changed: list[str]) -> dict[str, Any]:
+def _facts_of(what: str, found: "Found", changed: list[str]) -> dict[str, Any]:
     """Facts of a comparison, as a dictionary."""
     facts = found._asdict()
     equal_digests = facts.pop("equal")

@@ -31,9 +31,9 @@ def call_of(name: str, *arguments: Any, **options: Any) -> str:
     """
     given = [_shown(argument) for argument in arguments]
     empty = {key for key, value in options.items() if isinstance(value, tuple | list | dict) and not value}
-    said = {key: value for key, value in options.items() if value is not None and key not in empty}
-    given += [f"{key}={_shown(value)}" for key, value in said.items() if key.isidentifier()]
-    dotted = {key: value for key, value in said.items() if not key.isidentifier()}
+    passed = {key: value for key, value in options.items() if value is not None and key not in empty}
+    given += [f"{key}={_shown(value)}" for key, value in passed.items() if key.isidentifier()]
+    dotted = {key: value for key, value in passed.items() if not key.isidentifier()}
     given += [f"**{_shown(dotted)}"] if dotted else []
     return f"flownav.{name}({', '.join(given)})"
 

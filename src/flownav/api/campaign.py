@@ -163,8 +163,8 @@ class Campaign:
     def __repr__(self) -> str:
         lines = [f"<Campaign {', '.join(self.summary['scenarios'])}: {self.summary['flights']} flights>"]
         for cell in self.cells:
-            said = ", ".join(_words(name, cell["figures"][name]) for name in SHOWN if name in cell["figures"])
-            lines.append(f"  {cell['label']}: {said}")
+            words = ", ".join(_words(name, cell["figures"][name]) for name in SHOWN if name in cell["figures"])
+            lines.append(f"  {cell['label']}: {words}")
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:

@@ -77,11 +77,11 @@ def fly(
     require_from("seed", seed, 0, MOST_SEED)
     require_from("flight", number, 0, MOST_FLIGHTS)
     setup = assemble(scenario_of(scenario, **options).file)
-    said = {
+    passed = {
         **names_of(parts),
         **{name: value for name, value in options.items() if value is not None and name != "flight"},
     }
-    with called_as(call_of("fly", scenario, seed=seed, flight=flight, dispersed=dispersed or None, **said)):
+    with called_as(call_of("fly", scenario, seed=seed, flight=flight, dispersed=dispersed or None, **passed)):
         return fly_setup(setup, seed, number, dispersed=dispersed, parts=parts, progress=progress).record
 
 

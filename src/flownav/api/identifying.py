@@ -51,8 +51,8 @@ def identify(
     options = {
         "order": order, "heights_m": heights, "reference": reference, "flow_instance": flow_instance, "base": base
     }  # fmt: skip
-    said = call_of("identify", [str(path) for path in paths], **changed(identify, options))
-    with called_as(said):
+    call = call_of("identify", [str(path) for path in paths], **changed(identify, options))
+    with called_as(call):
         return identify_logs(paths, order, heights, reference, flow_instance=flow_instance, base=base)
 
 

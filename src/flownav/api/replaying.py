@@ -99,10 +99,10 @@ def replay_log(
     sensor: its file; stated: the user's own settings. table: windows, one replay each. part: a filter in the
     navigator's place. InputError as `replay`.
     """
-    told = settings_of(sensor, stated=stated)
-    identified = identified_flow(sensor, told.lag_states) if sensor else None
-    options = replace(options, identified=identified, flow_noise=told.noise)
-    options, settled = as_fed(log, options, told.settings if sensor or stated else None)
+    given = settings_of(sensor, stated=stated)
+    identified = identified_flow(sensor, given.lag_states) if sensor else None
+    options = replace(options, identified=identified, flow_noise=given.noise)
+    options, settled = as_fed(log, options, given.settings if sensor or stated else None)
     if part is not None and (table or smooth):
         raise InputError("a filter of your own takes neither an outage table nor smoothing; leave them out")
     if part is not None:

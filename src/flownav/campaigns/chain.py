@@ -44,8 +44,8 @@ def root_of(plan: Mapping[str, Any], cell: int) -> bytes:
     """The digest that the first row of a cell follows: of the campaign's plan, as written in its folder, and the cell's
     number.
     """
-    told = {name: value for name, value in plan.items() if name not in OF_NO_FLIGHT}
-    return hashlib.sha256(f"{json.dumps(told, sort_keys=True)}\n{cell}".encode()).digest()
+    flown_part = {name: value for name, value in plan.items() if name not in OF_NO_FLIGHT}
+    return hashlib.sha256(f"{json.dumps(flown_part, sort_keys=True)}\n{cell}".encode()).digest()
 
 
 def digests_of(table: Any, before: bytes) -> list[bytes]:
@@ -139,14 +139,14 @@ def read_part(path: Path) -> Part:
     if DIGEST not in table.column_names or BEFORE not in (table.schema.metadata or {}):
         raise DamagedError("its rows have no digests")
     before = _before(table.schema.metadata[BEFORE])
-    said = table.column(DIGEST).to_pylist()
+    stored_all = table.column(DIGEST).to_pylist()
     own = table.drop_columns([DIGEST])
     try:
         digests = digests_of(own, before)
     except (ValueError, TypeError, AttributeError) as error:  # a column of another type, or without a value
         raise DamagedError(f"its columns are not as they were written ({error})"[:120]) from error
-    for number, (found, told) in enumerate(zip(digests, said, strict=True)):
-        if found != told:
+    for number, (found, stored) in enumerate(zip(digests, stored_all, strict=True)):
+        if found != stored:
             raise DamagedError(f"row {number + 1} is not what its digest says")
     return Part(own, before, digests[-1] if digests else before)
 

@@ -23,10 +23,10 @@ from flownav.core.compile import ONE_LANE, WARP, NoDeviceError, Runner, announce
 from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array
 from flownav.estimation.covariance import with_lag
+from flownav.navigation.kernel_settings import carries_lag
 from flownav.navigation.memory import new_work
 from flownav.navigation.packed import load_flow_settings
 from flownav.navigation.take import navigator_unit
-from flownav.navigation.told import carries_lag
 from flownav.scoring.running import RUNNING_COLUMNS, RUNNING_ROWS
 from flownav.simulation.block import plain_noise
 from flownav.simulation.engine import buffers_of
@@ -65,8 +65,8 @@ def truths_of_cell(cell: Ready, seed: int, flights: int, processes: int) -> Iter
     if cell.ensemble is None or cell.failure is not None or processes < 2 or flights < WORTH_IT:
         yield truths_of(cell.flight, seed, cell.ensemble, cell.faults(seed))
         return
-    told = pickle.dumps((cell.setup, cell.truth_model, cell.sampling, cell.flights))
-    pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _begin, (told, seed))
+    pickled = pickle.dumps((cell.setup, cell.truth_model, cell.sampling, cell.flights))
+    pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _begin, (pickled, seed))
 
     def packed(first: int, count: int) -> Array:
         ends = [*range(first, first + count, SLICE_FLIGHTS), first + count]
@@ -81,8 +81,8 @@ def truths_of_cell(cell: Ready, seed: int, flights: int, processes: int) -> Iter
 _drawing: list[Truths] = []  # of a process that draws
 
 
-def _begin(told: bytes, seed: int) -> None:
-    cell = ready_of(*pickle.loads(told))
+def _begin(pickled: bytes, seed: int) -> None:
+    cell = ready_of(*pickle.loads(pickled))
     _drawing[:] = [truths_of(cell.flight, seed, cell.ensemble)]
 
 
@@ -159,7 +159,7 @@ class Room:
         self._runner, self._flight = runner, flight
         whole = -(-at_once // WARP) * WARP
         self._rows = rows_of_flight(flight)
-        self._told = {
+        self._arguments = {
             "flight": runner.put(flight), "noise": runner.put(plain_noise(1)), "rows": self._rows,
             "work": runner.new((whole * self._rows,), np.float64),
         }  # fmt: skip
@@ -167,11 +167,11 @@ class Room:
         self._function: Callable[..., None] = fly_paper_flight
         if flight.onboard is None:
             home = home_epoch(flight)
-            self._told["home"] = -1 if home is None else home
+            self._arguments["home"] = -1 if home is None else home
         else:
             self._function = fly_navigated_flight
             fresh = new_work(ONE_LANE, faults=flight.plan.minds_faults)
-            self._told |= {
+            self._arguments |= {
                 "fresh": runner.put(fresh), "nav": runner.new((whole * len(fresh),), np.float64),
                 "nothing": runner.put(np.zeros(1)), "room": runner.put(np.zeros(TAPE_COUNTS, np.int64)),
                 "used": runner.new((whole * TAPE_COUNTS,), np.int64),
@@ -183,8 +183,8 @@ class Room:
         """The rows of flights from number `first` on; truth: `packed_truth` of each, or of one for all."""
         put = self._runner.put
         scores = self._runner.new((RUNNING_COLUMNS, flights), np.float64)
-        told = self._told | {"seed": seed, "first": first, "truth": put(truth), "scores": scores}
-        self._runner.run(self._function, flights, told, self._constants)
+        arguments = self._arguments | {"seed": seed, "first": first, "truth": put(truth), "scores": scores}
+        self._runner.run(self._function, flights, arguments, self._constants)
         return np.ascontiguousarray(self._runner.fetch(scores).T)
 
 

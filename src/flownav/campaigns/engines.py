@@ -178,13 +178,13 @@ class RayCluster:
         self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object] = lambda flown: None
     ) -> Iterator[tuple[Part, Array]]:
         """The rows of each part, in order, whichever worker has flown it."""
-        told = self._ray.put((cell.setup, cell.truth_model, cell.sampling, cell.flights, cell.failure))
+        shared = self._ray.put((cell.setup, cell.truth_model, cell.sampling, cell.flights, cell.failure))
         key = secrets.token_hex(8)
         task = self._ray.remote(num_cpus=1, max_retries=-1)(fly_part)
         most = PARTS_AHEAD * max(1, int(self._ray.cluster_resources().get("CPU", 1)))
         waiting: deque[tuple[Part, Any]] = deque()
         for part in parts:
-            waiting.append((part, task.remote([told], key, seed, part)))
+            waiting.append((part, task.remote([shared], key, seed, part)))
             if len(waiting) >= most:
                 yield self._taken(*waiting.popleft(), on_progress)
         while waiting:
@@ -200,7 +200,7 @@ class RayCluster:
 _cells: dict[str, Ready] = {}  # of a worker: the last cell that it has flown
 
 
-def fly_part(told: list[Any], key: str, seed: int, part: Part) -> Array:
+def fly_part(shared: list[Any], key: str, seed: int, part: Part) -> Array:
     """A part's rows, flown by a worker on one thread. told: the reference to the arguments from which `plan.ready_of`
     makes a cell.
     """
@@ -208,6 +208,6 @@ def fly_part(told: list[Any], key: str, seed: int, part: Part) -> Array:
         import ray
 
         _cells.clear()
-        _cells[key] = ready_of(*ray.get(told[0]))
+        _cells[key] = ready_of(*ray.get(shared[0]))
     ((_, rows),) = Local(threads=1).fly(_cells[key], seed, [part])
     return rows

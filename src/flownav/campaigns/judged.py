@@ -22,8 +22,8 @@ from flownav.campaigns.local import counted_steps, largest_horizontal_m, score_h
 from flownav.core.measurement import Array, Sensor
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY
 from flownav.core.text import finite, finite_or_none
-from flownav.navigation.settings_of import Told
-from flownav.navigation.told import FlowNoise
+from flownav.navigation.kernel_settings import FlowNoise
+from flownav.navigation.settings_of import GivenSettings
 from flownav.scoring import consistency
 from flownav.scoring.errors import attitude_block
 from flownav.sensors.flow import flow_noise_sigma
@@ -94,8 +94,8 @@ def fly_judged(
         in_flight = counted * (1.0 - _on_ground(history))
         flown = consistency.error_sums((estimate - truth) ** 2, _skid_height(flight, history), in_flight)
         up, largest = takeoff_history(flight, history), largest_horizontal_m(flight, history)
-        said, true = (history[:, columns(table, QUATERNION)] for table in ("estimate", "truth"))
-        turned = attitude_block(said, true, counted)
+        estimated, true = (history[:, columns(table, QUATERNION)] for table in ("estimate", "truth"))
+        turned = attitude_block(estimated, true, counted)
         return score_history(flight, history), largest, flown, _at_horizon(flight, history), up, turned
 
     rows, largest, groups, ups, attitudes = [], [], [], [], []
@@ -187,17 +187,17 @@ def ablations(setup: Setup) -> dict[str, Flight]:
 
     ValueError where the paper's filter flies.
     """
-    carried = setup.fitted
-    if carried is None:
+    base = setup.fitted
+    if base is None:
         raise ValueError(f"{setup.scenario.name}: only the navigator can be taken apart")
-    told = carried.told
+    given = base.given
     variants = {
-        "flow's age": _with(setup, stated=carried.timing | {Sensor.FLOW_RATE: ageless(carried)}),
-        "height schedule": _with(setup, told=told._replace(noise=constant_flow_noise(told.noise))),
-        "compass deviation": _with(setup, told=without_compass_states(told)),
+        "flow's age": _with(setup, stated=base.timing | {Sensor.FLOW_RATE: ageless(base)}),
+        "height schedule": _with(setup, given=given._replace(noise=constant_flow_noise(given.noise))),
+        "compass deviation": _with(setup, given=without_compass_states(given)),
     }
     if setup.scenario.gps.model != "white":
-        variants["GPS error states"] = _with(setup, told=without_gps_states(told))
+        variants["GPS error states"] = _with(setup, given=without_gps_states(given))
     variants["barometer"] = _without(setup, "barometer")
     if setup.scenario.pad_fix is not None:
         variants["pad fix"] = _without(setup, "pad_camera")
@@ -218,11 +218,11 @@ def _without(setup: Setup, sensor: str) -> Flight:
     return _with(setup, onboard=without(setup.fitted.onboard, sensor))
 
 
-def ageless(carried: Fitted) -> Timing:
+def ageless(base: Fitted) -> Timing:
     """Timing of a flow sensor that is stated to show the velocity of now: no lag of its own, no latency; its jitter
     stays.
     """
-    return Timing(0.0, 0.0, carried.timing[Sensor.FLOW_RATE].jitter_s)
+    return Timing(0.0, 0.0, base.timing[Sensor.FLOW_RATE].jitter_s)
 
 
 def constant_flow_noise(noise: FlowNoise) -> FlowNoise:
@@ -234,10 +234,10 @@ def constant_flow_noise(noise: FlowNoise) -> FlowNoise:
     return noise._replace(noise_centre=law.centre, noise_scale=law.scale, **coefficients)
 
 
-def without_gps_states(told: Told) -> Told:
+def without_gps_states(given: GivenSettings) -> GivenSettings:
     """No memory of GPS errors: all of their variance is taken for white noise."""
-    s = told.settings
-    return told._replace(
+    s = given.settings
+    return given._replace(
         settings=s.model_copy(
             update={
                 "gps_slow_sigma_m": 0.0,
@@ -256,8 +256,8 @@ def without_gps_states(told: Told) -> Told:
     )
 
 
-def without_compass_states(told: Told) -> Told:
+def without_compass_states(given: GivenSettings) -> GivenSettings:
     """No deviation that turns with the vehicle: all of it is taken for noise of the heading, as lasting as the rest."""
-    s = told.settings
+    s = given.settings
     noise = min(math.hypot(s.heading_noise_rad, s.compass_sigma_rad), math.pi)
-    return told._replace(settings=s.model_copy(update={"compass_sigma_rad": 0.0, "heading_noise_rad": noise}))
+    return given._replace(settings=s.model_copy(update={"compass_sigma_rad": 0.0, "heading_noise_rad": noise}))

@@ -114,8 +114,8 @@ def counted_steps(flight: Flight, history: Array) -> Array:
     contact = history[:, column("truth", "contact_n")]
     if flight.onboard is None:
         return np.ones_like(contact)
-    handed = np.arange(len(history)) * EPOCH_S >= flight.plan.handover_s
-    return np.asarray(handed[:, None] & (contact <= 0.0), float)
+    after_handover = np.arange(len(history)) * EPOCH_S >= flight.plan.handover_s
+    return np.asarray(after_handover[:, None] & (contact <= 0.0), float)
 
 
 def fly_many(

@@ -232,10 +232,10 @@ def scenario_of(requirement: Requirement, vehicle: str | None = None) -> Scenari
     scenario = check(entries, Scenario, f"{requirement.name}: set") if requirement.set else scenario
     if not requirement.conditions.ranges:
         return scenario
-    told = scenario.dispersion.entries()
+    dispersed = scenario.dispersion.entries()
     ranges = {
         name: one if "known" in one.model_fields_set else one.model_copy(
-            update={"known": told[name].known if name in told else "day"}
+            update={"known": dispersed[name].known if name in dispersed else "day"}
         )
         for name, one in requirement.conditions.ranges.items()
     }  # fmt: skip

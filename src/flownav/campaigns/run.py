@@ -241,9 +241,9 @@ def record_again(plan: Plan, cell: int, flight: int, recording: Recording = fly_
     recording: what flies it, with parts that are not ours.
     """
     ready = plan.ready(cell)
-    failing = ready.faults(plan.seed)
+    injects = ready.faults(plan.seed)
     record = recording(
-        replace(ready.setup, flight=ready.flight), plan.seed, flight, ready.ensemble, failing and failing(flight)
+        replace(ready.setup, flight=ready.flight), plan.seed, flight, ready.ensemble, injects and injects(flight)
     )
     record.manifest["command"] = f"flownav campaign ... --flight {place_of(cell, flight)}"
     record.manifest["campaign"] = {"cell": plan.cells[cell].label, "flight": flight, "sampling": plan.sampling}

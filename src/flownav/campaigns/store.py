@@ -65,7 +65,7 @@ class Store:
         InputError where it holds something else, or where another process is flying there.
         """
         an_output_folder(self.folder)
-        said = json.dumps(plan.as_json, indent=1, sort_keys=True) + "\n"
+        plan_text = json.dumps(plan.as_json, indent=1, sort_keys=True) + "\n"
         self.check(plan.as_json)
         self.folder.mkdir(parents=True, exist_ok=True)
         lock = os.open(self.folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
@@ -77,8 +77,8 @@ class Store:
                     f"{self.folder}: another process is flying this campaign; wait, or give another name"
                 ) from None
             self._sweep()
-            if not (self.folder / PLAN).exists() or plan_in(self.folder) != json.loads(said):
-                _write_text(self.folder / PLAN, said)
+            if not (self.folder / PLAN).exists() or plan_in(self.folder) != json.loads(plan_text):
+                _write_text(self.folder / PLAN, plan_text)
             yield self
         finally:
             os.close(lock)

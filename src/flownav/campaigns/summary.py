@@ -59,13 +59,13 @@ def summary_of(plan: Plan, data: Dataset) -> dict[str, Any]:
 def cell_summary(plan: Plan, cell: int, data: Dataset) -> dict[str, Any]:
     """One cell."""
     own, rows = plan.cells[cell], data.rows(cell)
-    told = data.table(cell, ["verdict", "limited_by"])
-    verdicts, limits = (np.asarray(told[name].to_pylist()) for name in ("verdict", "limited_by"))
+    verdict_columns = data.table(cell, ["verdict", "limited_by"])
+    verdicts, limits = (np.asarray(verdict_columns[name].to_pylist()) for name in ("verdict", "limited_by"))
     counts, lands = Counter(verdicts.tolist()), was_to_land(rows)
     values = measures.values_of(LANDING if lands else TAKEOFF, rows)
     order = np.argsort(values, kind="stable")
     inputs = inputs_of(data, cell)
-    said = [Flight(cell, int(k), finite_or_none(values[k]), str(verdicts[k]), str(limits[k])) for k in order]
+    listed = [Flight(cell, int(k), finite_or_none(values[k]), str(verdicts[k]), str(limits[k])) for k in order]
     return {
         "label": own.label,
         "scenario": own.scenario.name,
@@ -80,8 +80,8 @@ def cell_summary(plan: Plan, cell: int, data: Dataset) -> dict[str, Any]:
         "convergence": convergence(LANDING if lands else TAKEOFF, values),
         "envelope": envelope(inputs, verdicts == "landed"),
         "sensitivity": sensitivity(inputs, values),
-        "median": said[(len(said) - 1) // 2]._asdict(),
-        "worst": [flight._asdict() for flight in reversed(said[-WORST_FLIGHTS:])],
+        "median": listed[(len(listed) - 1) // 2]._asdict(),
+        "worst": [flight._asdict() for flight in reversed(listed[-WORST_FLIGHTS:])],
     }
 
 

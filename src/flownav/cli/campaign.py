@@ -58,7 +58,7 @@ def command(
     from flownav.api.campaigning import plan_of
     from flownav.campaigns.run import engine_named, give_back_early, require_engine
     from flownav.campaigns.summary import WORST_FLIGHTS
-    from flownav.cli.campaign_said import fly_again, fly_rare
+    from flownav.cli.campaign_output import fly_again, fly_rare
     from flownav.parts.flying import OwnPartsEngine, identities
 
     give_back_early()
@@ -121,7 +121,7 @@ def _fly(plan: Plan, engine: Engine, folder: Path, records: int, as_json: bool) 
     """Fly the flights that the folder lacks, and print the result."""
     from flownav.api.campaigning import fly_plan
     from flownav.campaigns.store import REPORT
-    from flownav.cli.campaign_said import show, watching
+    from flownav.cli.campaign_output import show, watching
 
     with watching(plan) as watch:
         flown = fly_plan(plan, engine, folder, records=records, watch=watch)
@@ -134,7 +134,7 @@ def _fly(plan: Plan, engine: Engine, folder: Path, records: int, as_json: bool) 
 def _again(plan: Plan, flight: str, folder: Path, as_json: bool, engine: Engine | None) -> None:
     """One flight of the campaign, flown again."""
     from flownav.api.campaigning import fly_again
-    from flownav.cli.campaign_said import say_flight
+    from flownav.cli.campaign_output import say_flight
 
     cell, _, number = flight.rpartition(":")
     try:
@@ -253,6 +253,6 @@ def _show_envelope(title: str, rows: list[dict[str, Any]], page: Path) -> None:
         ring = {row["from_direction_deg"]: row["success"]["rate"] for row in rows if row["speed_20ft_m_s"] == speed}
         lines.append((f"{speed:g}", *(f"{100.0 * ring[direction]:.0f}" for direction in directions)))
     heads = ("m/s", *(f"{direction:g}°" for direction in directions))
-    said = "landed [%] by the wind at 20 ft (rows) and the direction that it blows from (columns)"
-    say(title, said, table(heads, lines, left=1), wide=max(len(said), 10 + 7 * len(directions)))
+    stated = "landed [%] by the wind at 20 ft (rows) and the direction that it blows from (columns)"
+    say(title, stated, table(heads, lines, left=1), wide=max(len(stated), 10 + 7 * len(directions)))
     typer.echo(f"page  {page}")

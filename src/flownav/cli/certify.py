@@ -70,7 +70,7 @@ def command(
     that its flights could not be flown again.
     """
     from flownav.campaigns.certification.cells import plan_of
-    from flownav.campaigns.certification.certify import FLIGHTS_TOLD
+    from flownav.campaigns.certification.certify import FLIGHTS_NAMED
     from flownav.campaigns.certification.signing import private_key
     from flownav.campaigns.ranking import LEAST_ROWS, MOST_ROWS
     from flownav.campaigns.requirement import load_requirement
@@ -88,7 +88,7 @@ def command(
         require_between("--flights", flights, 1, MOST_FLIGHTS)
     if ranking and (ranking & (ranking - 1) or not LEAST_ROWS <= ranking <= MOST_ROWS):
         raise InputError(f"--ranking {ranking}: must be 0 or a power of 2 from {LEAST_ROWS} to {MOST_ROWS}")
-    require_between("--records", records, 0, FLIGHTS_TOLD)
+    require_between("--records", records, 0, FLIGHTS_NAMED)
     require_engine(engine)
     asked = load_requirement(requirement)
     plan = plan_of(asked, flights, vehicle)
@@ -126,7 +126,7 @@ def _fly(asked: Requirement, plan: Plan, how: How, name: str, folder: Path) -> d
     from flownav.campaigns.engines import Local
     from flownav.campaigns.ranking import flights_of
     from flownav.campaigns.store import Dataset, Store
-    from flownav.cli.campaign_said import watching
+    from flownav.cli.campaign_output import watching
 
     inputs = max(len(cell.setup.ensemble().entries) for cell in plan.cells)
     require_planned(plan, folder)
@@ -155,8 +155,8 @@ def _verify(folder: Path, requirement: str | None, again: int, key: Path | None,
     with progress("Flying some again", again) as advance:
         found = verify(folder, Local(), requirement=requirement, sample=again, key=key, on_progress=advance)
     facts = found.as_json()
-    said = f"{facts['verification'].upper()}  {facts['requirement']}, certified as: {facts['verdict']}"
-    answer(facts, as_json, lambda: say(said, table_of(CHECKED, facts["checks"], left=3), wide=WIDE))
+    words = f"{facts['verification'].upper()}  {facts['requirement']}, certified as: {facts['verdict']}"
+    answer(facts, as_json, lambda: say(words, table_of(CHECKED, facts["checks"], left=3), wide=WIDE))
     if found.wrong:
         raise VerdictError(f"{folder}: {'; '.join(found.wrong)}")
 
@@ -176,8 +176,8 @@ def _say_plan(asked: Requirement, as_json: bool) -> None:
         for table in asked.requirement
     ]
     plan = {"requirement": asked.name, "flights": asked.flights(), "requirements": rows}
-    said = f"{asked.name}: {asked.flights()} flights"
-    answer(plan, as_json, lambda: say(said, table_of(PLAN, rows, left=1), wide=WIDE))
+    words = f"{asked.name}: {asked.flights()} flights"
+    answer(plan, as_json, lambda: say(words, table_of(PLAN, rows, left=1), wide=WIDE))
 
 
 INPUTS_RANKED = 5  # inputs that are printed
@@ -196,9 +196,9 @@ def show(facts: dict[str, Any]) -> None:
     fields, cells = facts["envelope"]["bins"], facts["envelope"]["cells"]
     if fields:
         counts = [(sum(field["verdict"] == name for field in fields), name) for name in ("pass", "not shown", "fail")]
-        said = ", ".join(f"{count} {name}" for count, name in counts)
+        words = ", ".join(f"{count} {name}" for count, name in counts)
         lines.append(
-            f"envelope  {len(fields)} fields over {' and '.join(map(key_words, facts['envelope']['axes']))}: {said}"
+            f"envelope  {len(fields)} fields over {' and '.join(map(key_words, facts['envelope']['axes']))}: {words}"
         )
     for cell in cells if len(cells) > 1 else ():
         lines.append(f"cell      {cell['cell']}: {cell['failures']} of {cell['flights']} failed, {cell['verdict']}")

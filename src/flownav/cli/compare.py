@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 DEFAULT = "default"
 SHORT_RECORDS = ("against", "horizontal\n[m]", "vertical\n[m]", "velocity\n[m/s]", "touchdown\n[m]")
 SHORT_APART = ("mean", "95 % from", "95 % to")
-SAID = {"horizontal_m": "horizontal [m]", "vertical_m": "vertical [m]", "velocity_m_s": "velocity [m/s]"}
+ERROR_TITLES = {"horizontal_m": "horizontal [m]", "vertical_m": "vertical [m]", "velocity_m_s": "velocity [m/s]"}
 SHORT = (
     "estimator", "place\n[m]", "flying\n[m]", "speed\n[m/s]", "flying\n[m/s]", "end\n[m]", "cut [m]\nmedian",
     "cut [m]\nworst",
@@ -109,10 +109,10 @@ def settings_asked(asked: list[str], sensor: Path | None) -> list[Setting]:
     found = []
     for text in asked:
         stated = None if text == DEFAULT else load(Path(text), NavigatorSettingsFile)
-        told = settings_of(flow, stated=stated)
-        identified = identified_flow(flow, told.lag_states) if flow else None
-        options = ReplayOptions(identified=identified, flow_noise=told.noise)
-        found.append(Setting(names[text], options, told.settings if flow or stated else None))
+        given = settings_of(flow, stated=stated)
+        identified = identified_flow(flow, given.lag_states) if flow else None
+        options = ReplayOptions(identified=identified, flow_noise=given.noise)
+        found.append(Setting(names[text], options, given.settings if flow or stated else None))
     return found
 
 
@@ -129,7 +129,7 @@ def _show_records(rows: list[dict[str, Any]], written: dict[str, str]) -> None:
         apart.add_row(row["record"])
         for name in MEASURES:
             found = (row["difference"] or {}).get(name) or {}
-            apart.add_row(f"  {SAID[name]}", *(figure(found.get(key)) for key in ("mean", "low", "high")))
+            apart.add_row(f"  {ERROR_TITLES[name]}", *(figure(found.get(key)) for key in ("mean", "low", "high")))
     say(errors, apart)
     say_files(written, written)
 

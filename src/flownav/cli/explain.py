@@ -60,11 +60,11 @@ def command(
     read = open_log(log, flow_instance=flow_instance, topics=asked_topics(topic or []))
     with announce_compilation("explanation"):
         explained = explain(read, dialect=autopilot or "")
-    told = facts(explained)
+    found = facts(explained)
     with writing(page):
         write_explanation(explained, read.span_s, page)
-    told |= {"page": str(page), "parameters": _write_cure(explained, page, SUFFIX)}
-    answer(told, as_json, lambda: _show(told))
+    found |= {"page": str(page), "parameters": _write_cure(explained, page, SUFFIX)}
+    answer(found, as_json, lambda: _show(found))
     if explained.first is not None:
         raise VerdictError(f"{log}: {explained.first.title}")
 
@@ -79,21 +79,21 @@ def _write_cure(explained: Explanation, page: Path, suffixes: dict[str, str]) ->
     return str(path)
 
 
-def _show(told: dict[str, Any]) -> None:
+def _show(found: dict[str, Any]) -> None:
     """The verdict on top, then each cause with its cure, and what was looked for."""
-    say(f"{told['log']}: {told['verdict']}")
-    for number, one in enumerate(told["causes"]):
+    say(f"{found['log']}: {found['verdict']}")
+    for number, one in enumerate(found["causes"]):
         if number:
             say(f"Also: {one['sentence']} ({one['t0_s']:.0f} to {one['t1_s']:.0f} s)")
         if one["cure"]["parameters"]:
             say(table_of(CURE, one["cure"]["parameters"], left=1))
         if one["cure"]["by_hand"]:
             say(one["cure"]["by_hand"])
-    likely = [row for row in told["checked"] if row["probability"] >= LEAST_LIKELY]
+    likely = [row for row in found["checked"] if row["probability"] >= LEAST_LIKELY]
     if likely:
         likely.sort(key=lambda row: (bool(row["consequence_of"]), -row["probability"]))
         say(table_of(TRIED, likely, left=1, title="Hypotheses that remained"))
-    say(f"Looked for: {', '.join(row['cause'] for row in told['checked'])}.")
-    for row in told["missing"]:
+    say(f"Looked for: {', '.join(row['cause'] for row in found['checked'])}.")
+    for row in found["missing"]:
         say(f"Not looked into, {row['cause']}: {row['what']}.")
-    say_files(told, ("page", "parameters"))
+    say_files(found, ("page", "parameters"))

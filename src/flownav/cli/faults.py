@@ -92,8 +92,8 @@ def _say(
     """One JSON object, or the rows as a table whose columns are explained below it."""
 
     def show() -> None:
-        said = [row.entry() | {"faulty": row.duration_s > 0.0} for row in rows]
-        say(table_of(columns, said, left=1, fixed=len(FAULT), title=title, title_justify="left"), note, wide=WIDE)
+        entries = [row.entry() | {"faulty": row.duration_s > 0.0} for row in rows]
+        say(table_of(columns, entries, left=1, fixed=len(FAULT), title=title, title_justify="left"), note, wide=WIDE)
 
     answer(facts | {"rows": [row.entry() for row in rows]}, as_json, show)
 

@@ -50,10 +50,10 @@ def command(
     as_json: options.Json = False,
 ) -> None:
     """Fly a scenario: the table of errors beside Table 5 or 6, touchdown, the record and its report."""
-    from flownav.core.compile import begin_beside
+    from flownav.core.compile import begin_in_parallel
 
     if filter_name is None and flights == 1:
-        begin_beside("flownav.navigation.take", "navigate_one")
+        begin_in_parallel("flownav.navigation.take", "navigate_one")
     from flownav.api.calls import split
     from flownav.api.flying import MOST_FLIGHTS, fly_setup
     from flownav.api.scenario import Scenario
@@ -92,7 +92,7 @@ def command(
 
 def _say(facts: dict[str, Any], flown: Flights, flights: int, as_json: bool) -> None:
     """The figures of the flights. VerdictError where too many crashed or never landed."""
-    from flownav.cli.fly_said import show
+    from flownav.cli.fly_output import show
 
     answer(facts, as_json, lambda: show(facts, flown.record.manifest, flown.index))
     if int(facts["crashed"]) > CRASHES_ALLOWED * flights:

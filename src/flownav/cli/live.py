@@ -96,13 +96,13 @@ def command(
         raise InputError("--write, --source-set and --origin go with --setup only")
     if record is not None:
         require_recordable(record, sensor, signing_key, settings, force=force)
-    told = replace(
+    given = replace(
         _options(send, system, component, signing_key, gps_delay, sensor, settings),
         limits=Limits(dead_reckoning_s=send_limit, sigma_m=send_sigma, protection_m=send_protection, unfused_s=unfused),
         accept=accepted_by(accept or []),
         capacity_bytes_s=capacity or parse_url(url).capacity_bytes_s,
     )
-    _navigate(url, told, record, duration, force=force, as_json=as_json)
+    _navigate(url, given, record, duration, force=force, as_json=as_json)
 
 
 def _navigate(
@@ -113,7 +113,7 @@ def _navigate(
     from flownav.live.display import on_terminal
     from flownav.live.filtering import Keeper
     from flownav.live.loop import Latency, run_as_others, run_before_others, run_session, stoppable, warm_up
-    from flownav.live.recorder import told_every_second
+    from flownav.live.recorder import facts_every_second
     from flownav.live.screen import Screen, traffic_facts
     from flownav.live.session import Session
 
@@ -133,17 +133,17 @@ def _navigate(
 
         with stoppable() as asked:
             with on_terminal(Screen(session, latency, url, recorder, scheduling, link).view, shown=shown) as display:
-                shows = [display.show, *([told_every_second(recorder, facts_now)] if recorder is not None else [])]
+                shows = [display.show, *([facts_every_second(recorder, facts_now)] if recorder is not None else [])]
                 run_session(session, link, latency, lambda: asked() or time.monotonic() >= end_s, shows)
             run_as_others()
             facts = facts_now()
-            heard = session.reception.vehicle is not None
-            finished = recorder.finish(facts, heard=heard) if recorder is not None else None
+            received = session.reception.vehicle is not None
+            finished = recorder.finish(facts, received=received) if recorder is not None else None
     if finished is not None:
         facts |= finished.facts()
     if not display.stuck:
         _say(facts, as_json=as_json)
-    if not heard:
+    if not received:
         raise VerdictError(_nobody(url, facts))
     if finished is not None and finished.reason:
         raise VerdictError(finished.verdict())
@@ -153,8 +153,8 @@ def _nobody(url: str, facts: dict[str, Any]) -> str:
     """Why there was no vehicle to navigate."""
     others = [f"{system}.{component}" for system, component in facts["other_autopilots"]]
     if others:
-        heard = ", ".join(others)
-        return f"{url}: only autopilots that were not asked for were received ({heard}); see --system, --component"
+        senders = ", ".join(others)
+        return f"{url}: only autopilots that were not asked for were received ({senders}); see --system, --component"
     return f"{url}: no autopilot was received in {facts['duration_s']:.1f} s; see that it sends there"
 
 
@@ -190,16 +190,16 @@ def _options(
     from flownav.sensors.datasheet import identified_flow, load_sensor
 
     flow = load_sensor(sensor) if sensor else None
-    told = settings_of(flow, stated=load(settings, NavigatorSettingsFile) if settings else None)
+    given = settings_of(flow, stated=load(settings, NavigatorSettingsFile) if settings else None)
     return Options(
         send=send,
         system=system,
         component=component,
         key=load_key(key) if key else None,
         gps_delay_s=gps_delay_s,
-        identified=identified_flow(flow, told.lag_states) if flow else None,
-        settings=told.settings,
-        flow_noise=told.noise,
+        identified=identified_flow(flow, given.lag_states) if flow else None,
+        settings=given.settings,
+        flow_noise=given.noise,
     )
 
 
@@ -232,8 +232,8 @@ def _facts(session: Session, latency: Latency, duration_s: float) -> dict[str, A
         "other_autopilots": session.reception.others,
         "sent": session.sent,
         "withheld": dict(session.withheld),
-        "readings": {sensor.name.lower(): count for sensor, count in sorted(session.hearing.readings.items())},
-        "sources": session.hearing.sources.names(),
+        "readings": {sensor.name.lower(): count for sensor, count in sorted(session.intake.readings.items())},
+        "sources": session.intake.sources.names(),
         "dropped": session.dropped,
         "resets": session.resets,
         "alarms": {
@@ -244,9 +244,9 @@ def _facts(session: Session, latency: Latency, duration_s: float) -> dict[str, A
             }
             for sensor, spell in sorted(session.offering.past_alarms.items())
         },
-        "horizon_s": session.hearing.horizon_s,
-        "lags_s": {sensor.name.lower(): lag_s for sensor, lag_s in sorted(session.hearing.lags.by_sensor.items())},
-        "origin": session.hearing.origin.as_facts(),
+        "horizon_s": session.intake.horizon_s,
+        "lags_s": {sensor.name.lower(): lag_s for sensor, lag_s in sorted(session.intake.lags.by_sensor.items())},
+        "origin": session.intake.origin.as_facts(),
         "requests": dict(session.requests.answers),
         "refused": session.requests.refused,
         "timesync_round_trip_ms": 1e3 * best.round_trip_s if best else None,

@@ -60,7 +60,7 @@ def place(path: Path, *inputs: str | Path | None, force: bool, beside: Sequence[
 
     found = a_place(path, _read(inputs), force=force, beside=beside)
     _require_place(path)
-    return told(path, found)
+    return named_place(path, found)
 
 
 def _read(inputs: Iterable[str | Path | None]) -> list[Path]:
@@ -76,7 +76,7 @@ def several_place(path: Path, *inputs: str | Path | None, force: bool) -> Path:
 
     found = a_place_of_several(path, _read(inputs), force=force)
     _require_place(path)
-    return told(path, found)
+    return named_place(path, found)
 
 
 def folder_place(path: Path, *inputs: str | Path | None, force: bool | None = None) -> Path:
@@ -89,7 +89,7 @@ def folder_place(path: Path, *inputs: str | Path | None, force: bool | None = No
     _read(inputs)
     found = a_folder_place(path, force=bool(force))
     _require_place(path)
-    return told(path, found, replaces=force is not None)
+    return named_place(path, found, replaces=force is not None)
 
 
 def record_place(path: Path, *inputs: str | Path | None, force: bool, report: bool) -> Path:
@@ -98,7 +98,7 @@ def record_place(path: Path, *inputs: str | Path | None, force: bool, report: bo
     return place(path, *inputs, force=force, beside=() if page is None else (page.suffix,))
 
 
-def told(asked: Path, found: Path, *, replaces: bool = True) -> Path:
+def named_place(asked: Path, found: Path, *, replaces: bool = True) -> Path:
     """The path that is written; printed on stderr where it is not the one that was asked for."""
     if found != asked:
         how = " (--force replaces it)" if replaces else ""

@@ -86,8 +86,8 @@ def command(
         return _print_target(target, output.place(print_to, force=force), as_json)
     if frames:
         found = _found(frames, target, focal, image_x)
-        said = f"found in {found['found']} of {found['frames']} frames"
-        return output.answer(found, as_json, lambda: output.say(output.table_of(FOUND, found["per_frame"]), said))
+        summary = f"found in {found['found']} of {found['frames']} frames"
+        return output.answer(found, as_json, lambda: output.say(output.table_of(FOUND, found["per_frame"]), summary))
     datasheet = None if out is None else output.place(out, force=force)
     frames_in = None if pictures is None else output.folder_place(pictures)
     at_m = sorted(set(numbers("--heights", heights, 0.05, 50.0)))

@@ -104,7 +104,7 @@ def validate(
 
 def _show_validated(rows: list[Row]) -> None:
     """The rows for people."""
-    from flownav.studies.validation.page import TOO_KIND, number, said, verdicts, widened
+    from flownav.studies.validation.page import TOO_KIND, number, sentences_of, verdicts, widened
 
     heads = ("log", "figure", "flown", "simulated", "least", "largest", "the simulator is")
     shown = table(heads, title="Recorded flights, and the same paths with simulated sensors", title_justify="left")
@@ -113,6 +113,6 @@ def _show_validated(rows: list[Row]) -> None:
     for row in rows:
         cells = [number(value) for value in (row.flown, row.simulated, row.low, row.high)]
         shown.add_row(row.log, row.figure, *cells, row.verdict, style="bold" if row.verdict == TOO_KIND else "")
-    sentences = [f"Too kind: {sentence}" for sentence in said(rows, TOO_KIND)]
+    sentences = [f"Too kind: {sentence}" for sentence in sentences_of(rows, TOO_KIND)]
     drawn = [f"Widened: {name}: {drawn} ({source})" for name, drawn, source in widened()]
     say(shown, verdicts(rows), *sentences, *drawn, wide=WIDE)

@@ -7,7 +7,7 @@ import typer
 
 from flownav.cli import options
 from flownav.cli.options import chosen, named, option, out_option
-from flownav.cli.output import answer, folder_place, place, require_recordable, several_place, told, writing
+from flownav.cli.output import answer, folder_place, named_place, place, require_recordable, several_place, writing
 from flownav.core.errors import InputError, VerdictError
 
 NO_FILE = "none is written; without a display RECORD.rrd"
@@ -60,13 +60,13 @@ def view(
         notes = show(flown, record.stem) if path is None else write_rrd(flown, path)
     written = None if path is None else str(path)
     if path is None:
-        said = f"Opened in Rerun: {record}"
+        message = f"Opened in Rerun: {record}"
     elif beside:
-        said = f"No display here, so no window: written {path}; `rerun {path}` opens it where there is one"
+        message = f"No display here, so no window: written {path}; `rerun {path}` opens it where there is one"
     else:
-        said = f"Written: {path}"
+        message = f"Written: {path}"
     facts = {"record": str(record), "file": written, "window": path is None, "notes": notes}
-    answer(facts, as_json, lambda: _echo(said, *(f"Note: {note}" for note in notes)))
+    answer(facts, as_json, lambda: _echo(message, *(f"Note: {note}" for note in notes)))
 
 
 def export_to(
@@ -97,9 +97,9 @@ def export_to(
     with writing(path):
         written = export(flown, to, path, frame, merge, about)
     files = [str(file) for file in written.files]
-    said = [*(f"Written: {file}" for file in files), *(f"Note: {note}" for note in written.notes)]
+    message = [*(f"Written: {file}" for file in files), *(f"Note: {note}" for note in written.notes)]
     facts = {"record": str(record), "format": to, "files": files, "notes": written.notes}
-    answer(facts, as_json, lambda: _echo(*said))
+    answer(facts, as_json, lambda: _echo(*message))
 
 
 def recover(
@@ -120,7 +120,7 @@ def recover(
         raise InputError(f"{journal}: its session still records; end that, and it writes the record itself")
     asked = out or (journal.with_suffix("") if journal.suffix == SUFFIX else journal.with_suffix(".fnr"))
     require_recordable(asked, journal, force=force)
-    path = asked if force else told(asked, free_name(asked))
+    path = asked if force else named_place(asked, free_name(asked))
     found = recovered(journal)
     with writing(path):
         found.record.save(path, replacing=force)
@@ -132,8 +132,8 @@ def recover(
     }
     how = "the session came to its end" if found.ended else "the session was cut off"
     torn = f"At the end {found.torn_bytes} bytes of a block that was not written whole are left out"
-    said = [f"{facts['duration_s']:.1f} s in {found.blocks} blocks; {how}", *([torn] if found.torn_bytes else [])]
-    answer(facts, as_json, lambda: _echo(*said, f"Record: {path} ({journal} is no longer needed)"))
+    message = [f"{facts['duration_s']:.1f} s in {found.blocks} blocks; {how}", *([torn] if found.torn_bytes else [])]
+    answer(facts, as_json, lambda: _echo(*message, f"Record: {path} ({journal} is no longer needed)"))
     if found.lost_blocks:
         raise VerdictError(
             f"{journal}: {found.lost_blocks} damaged blocks ({found.lost_bytes} bytes) in its middle are missing from "

@@ -144,29 +144,29 @@ def show(record: Record, scores: dict[str, Any], *, verbose: bool = False) -> No
 
 def error_lines(scores: dict[str, Any]) -> list[str]:
     """The errors against each reference that there is, a sentence a line."""
-    said, truth = [], scores.get("truth")
+    sentences, truth = [], scores.get("truth")
     if "outage_median_rms_m" in scores:
         median, worst = figure(scores["outage_median_rms_m"]), figure(scores["outage_worst_rms_m"])
-        said.append(f"Over the table's windows: median {median} m rms, worst {worst} m rms")
+        sentences.append(f"Over the table's windows: median {median} m rms, worst {worst} m rms")
     if scores["velocity_rms_m_s"] is not None:
-        said.append(f"Horizontal velocity against GPS: {scores['velocity_rms_m_s']:.3f} m/s rms")
+        sentences.append(f"Horizontal velocity against GPS: {scores['velocity_rms_m_s']:.3f} m/s rms")
     if truth:
         turned = "" if truth["yaw_rad"] is None else f", turned by {57.29578 * truth['yaw_rad']:.1f} deg"
-        said.append(
+        sentences.append(
             f"Against {truth['reference']}{turned}: horizontal {truth['horizontal_rms_m']:.2f} m rms, "
             f"{truth['horizontal_max_m']:.2f} m max; velocity {truth['velocity_rms_m_s']:.3f} m/s rms"
         )
     if scores["end_drift_m"] is not None:
         laid = f"{scores['truth']['reference']} laid on it at take-off"
-        said.append(f"At the end of the flight, {laid}: {scores['end_drift_m']:.2f} m off")
+        sentences.append(f"At the end of the flight, {laid}: {scores['end_drift_m']:.2f} m off")
     if scores["protection"]:
-        said.append(_protection(scores["protection"]))
+        sentences.append(_protection(scores["protection"]))
     if "smoothed" in scores:
-        said.append(f"Smoothed over the whole flight: {_smoothed_errors(scores['smoothed'])}")
+        sentences.append(f"Smoothed over the whole flight: {_smoothed_errors(scores['smoothed'])}")
     own = scores.get("autopilot", {})
     if own.get("against"):
-        said.append(f"The autopilot's own estimate ({own['name']}) {autopilot_errors(own)}")
-    return said
+        sentences.append(f"The autopilot's own estimate ({own['name']}) {autopilot_errors(own)}")
+    return sentences
 
 
 def autopilot_errors(scores: dict[str, Any]) -> str:
@@ -200,16 +200,16 @@ def _sensors(scores: dict[str, Any], *, verbose: bool) -> list[Any]:
     kept = range(len(heads)) if verbose else (0, len(heads) - 1)
     look = plain_look(edge=False)
     return [table([heads[k] for k in kept], ([row[k] for k in kept] for row in shown), fixed=1, **look),
-            *(f"  {said}" for said in meanings(row[-1] for row in rows))]  # fmt: skip
+            *(f"  {sentences}" for sentences in meanings(row[-1] for row in rows))]  # fmt: skip
 
 
 def _protection(found: dict[str, Any]) -> str:
     """Protection levels in words."""
-    level, unsaid = found["horizontal_m"], found["exceeded_unsaid_fraction"]
-    said = f"Protection level, horizontal: {level['median']:.2f} m in the median, {level['p95']:.2f} m at 95 %"
-    late = "" if unsaid is None else ". The error stayed within it, or a warning stood"
-    late = f". The error was above it without a warning {100.0 * unsaid:.2f} % of the time" if unsaid else late
-    return said + late
+    level, unwarned = found["horizontal_m"], found["exceeded_unsaid_fraction"]
+    sentences = f"Protection level, horizontal: {level['median']:.2f} m in the median, {level['p95']:.2f} m at 95 %"
+    late = "" if unwarned is None else ". The error stayed within it, or a warning stood"
+    late = f". The error was above it without a warning {100.0 * unwarned:.2f} % of the time" if unwarned else late
+    return sentences + late
 
 
 def _rejected(scores: dict[str, Any]) -> Any:
@@ -226,17 +226,17 @@ def _rejected(scores: dict[str, Any]) -> Any:
 
 def _smoothed_errors(scores: dict[str, Any]) -> str:
     """The smoothed path's errors in words."""
-    said = [
+    sentences = [
         f"GPS cut {cut['t0']:g} to {cut['t1']:g} s: {figure(cut['horizontal_rms_m'])} m rms, "
         f"{figure(cut['horizontal_max_m'])} m max"
         for cut in scores["outages"]
     ]
     if scores["velocity_rms_m_s"] is not None:
-        said.append(f"velocity against GPS {scores['velocity_rms_m_s']:.3f} m/s rms")
+        sentences.append(f"velocity against GPS {scores['velocity_rms_m_s']:.3f} m/s rms")
     if "truth" in scores:
         truth = scores["truth"]
-        said.append(f"against {truth['reference']} {truth['horizontal_rms_m']:.2f} m rms horizontally")
-    return "; ".join(said) or "nothing to compare it with"
+        sentences.append(f"against {truth['reference']} {truth['horizontal_rms_m']:.2f} m rms horizontally")
+    return "; ".join(sentences) or "nothing to compare it with"
 
 
 STREAMS = (
@@ -288,8 +288,8 @@ def _print(facts: dict[str, Any]) -> None:
             say(f"Thrown away of {s['sensor']}: {rejected}")
     say(*(f"Clock: {line}" for line in facts["clock"] or ["no gap, no jump, nothing repeated"]))
     for name, limit in facts["limits"].items():
-        said, share = f"Stated limits of {name}: {limit['low']:g} to {limit['high']:g}", limit["outside_share"]
-        say(said if share is None else f"{said}; {100 * share:.1f} % of readings outside")
+        sentences, share = f"Stated limits of {name}: {limit['low']:g} to {limit['high']:g}", limit["outside_share"]
+        say(sentences if share is None else f"{sentences}; {100 * share:.1f} % of readings outside")
     say(f"Compared: {facts['checked']}", *(f"Warning: {text}" for text in facts["warnings"]))
     if facts["absences"]:
         say("Missing sensors, and the substitutes used:")

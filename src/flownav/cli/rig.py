@@ -139,8 +139,8 @@ def _list(*, as_json: bool) -> None:
     from flownav.export.samples.kinds import SAMPLES as MADE
 
     rows = [{"kind": s.kind, "name": s.name, "what": s.what, "commands": list(s.commands)} for s in MADE]
-    said = "\n".join(f"{row['kind']:<10} {row['name']}\n    {row['what']}" for row in rows)
-    answer({"samples": rows}, as_json, lambda: typer.echo(said))
+    listing = "\n".join(f"{row['kind']:<10} {row['name']}\n    {row['what']}" for row in rows)
+    answer({"samples": rows}, as_json, lambda: typer.echo(listing))
 
 
 def _facts_written(written: list[Written]) -> list[dict[str, Any]]:

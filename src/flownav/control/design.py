@@ -14,7 +14,7 @@ where a cyclic gives it a rate.
 import math
 
 from flownav.control.gains import AutopilotGains
-from flownav.control.learnt_model import Told
+from flownav.control.learnt_model import NominalModel
 from flownav.control.loops import OUTER_S
 from flownav.vehicle import rotor
 from flownav.vehicle.feasibility import hover_induced_velocity, hover_pitch
@@ -88,14 +88,14 @@ def helicopter_gains(
 SLOP_UNSURE = 0.3  # standard deviation of the dead band, a share: half of the shipped sheet's value
 
 
-def told_before(vehicle: VehicleParameters, hover: Trim, begins: int) -> Told:
+def nominal_model(vehicle: VehicleParameters, hover: Trim, begins: int) -> NominalModel:
     """Beliefs about a helicopter before it is learnt in hover; begins: the epoch of the stir, below 0: never."""
     spring = vehicle.hub_stiffness_n_m_rad + vehicle.hub_above_cg_m * hover.thrust_n
     inflow, tip = hover.induced_velocity_m_s, vehicle.main_tip_speed_m_s
     back = vehicle.flap_response * rotor.blowback(
         hover.collective_rad, 0.0, 0.0, inflow, vehicle.main_lift_solidity, tip
     )  # fmt: skip
-    return Told(
+    return NominalModel(
         spring / vehicle.inertia_yy_kg_m2, spring / vehicle.inertia_xx_kg_m2, vehicle.flap_rate_1_s,
         vehicle.cyclic_frequency_rad_s, vehicle.cyclic_damping_ratio, vehicle.cyclic_dead_band_rad,
         SLOP_UNSURE * vehicle.cyclic_dead_band_rad, vehicle.per_main_speed_s_rad, float(back / tip), begins,

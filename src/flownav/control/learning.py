@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.control.learnt_model import Line, Servo, Told, answered, residual_of
+from flownav.control.learnt_model import Line, NominalModel, Servo, answered, residual_of
 from flownav.core.compile import Lanes, Work, equation, exp, procedure, replacing
 
 EPOCH_S = 0.02
@@ -69,7 +69,7 @@ LOWEST_M = 1.0  # of the skids over a ground that is known: no stir below
 PRIOR = (0.45, 0.45, 0.25, 0.25, 0.07)  # standard deviations of the unknown: wider than the box of the shipped sheet
 # of a line's residuals: gusts leave the more the slower they are (their spectrum falls as 1/w²)
 WEIGHTS = np.clip(OMEGA_RAD_S / 12.0, 0.4, 1.2)
-NOTHING_SAID_RAD = 3e-5  # standard deviation of a residual before any is known: a gust's of 4 m/s
+FIRST_RESIDUAL_RAD = 3e-5  # standard deviation of a residual before any is known: a gust's of 4 m/s
 STEEPEST = 0.26  # sine of the tilt beyond the commanded one at which the stir is broken off: 15 degrees
 
 
@@ -144,7 +144,7 @@ def line_at(work: Work, lanes: Lanes, row: int, period: int, line: int, lane: in
 
 
 @procedure
-def servo_error(work: Work, lanes: Lanes, row: int, lane: int, axis: int, told: Told, periods: int) -> float:
+def servo_error(work: Work, lanes: Lanes, row: int, lane: int, axis: int, nominal: NominalModel, periods: int) -> float:
     """Standard deviation of the angle by which an axis' servos are behind their command, by their stated model
     [rad].
     """
@@ -153,34 +153,34 @@ def servo_error(work: Work, lanes: Lanes, row: int, lane: int, axis: int, told: 
         power = 0.0
         for line in range(LINES):
             if AXIS[line] == axis:
-                w = OMEGA_RAD_S[line] / told.servo_rad_s
-                lag = 2.0 * told.servo_damping * w
+                w = OMEGA_RAD_S[line] / nominal.servo_rad_s
+                lag = 2.0 * nominal.servo_damping * w
                 behind = (w * w * w * w + lag * lag) / ((answers - w * w) * (answers - w * w) + lag * lag)
                 for period in range(periods):
                     asked = line_at(work, lanes, row, period, line, lane)
                     size = asked.command_re * asked.command_re + asked.command_im * asked.command_im
                     power += 0.5 * size * behind / periods
-        answers = answered(told.slop_rad, np.sqrt(power))
+        answers = answered(nominal.slop_rad, np.sqrt(power))
     behind_rad: float = np.sqrt(power)
     return behind_rad
 
 
 @procedure
-def solved(work: Work, lanes: Lanes, row: int, scratch: int, lane: int, told: Told, periods: int) -> Learnt:
+def solved(work: Work, lanes: Lanes, row: int, scratch: int, lane: int, nominal: NominalModel, periods: int) -> Learnt:
     """Gauss-Newton estimate from the sums of the periods, with the beliefs in `told` as prior. scratch: rows to work
     in.
     """
     apart = len(lanes)
     normal = scratch * apart + lane
     slope, x = normal + UNKNOWN * UNKNOWN * apart, normal + (UNKNOWN + 1) * UNKNOWN * apart
-    behind_lon = servo_error(work, lanes, row, lane, 0, told, periods)
-    behind_lat = servo_error(work, lanes, row, lane, 1, told, periods)
+    behind_lon = servo_error(work, lanes, row, lane, 0, nominal, periods)
+    behind_lat = servo_error(work, lanes, row, lane, 1, nominal, periods)
     behind = behind_lon, behind_lat
-    less = answered(told.slop_rad + told.slop_std_rad, 0.5 * (behind[0] + behind[1]))
-    unsure = 1.0 - less / answered(told.slop_rad, 0.5 * (behind[0] + behind[1])) + 1e-6
+    less = answered(nominal.slop_rad + nominal.slop_std_rad, 0.5 * (behind[0] + behind[1]))
+    unsure = 1.0 - less / answered(nominal.slop_rad, 0.5 * (behind[0] + behind[1])) + 1e-6
     for i in range(UNKNOWN):
         work[x + i * apart] = 0.0
-    variance = NOTHING_SAID_RAD * NOTHING_SAID_RAD
+    variance = FIRST_RESIDUAL_RAD * FIRST_RESIDUAL_RAD
     for _ in range(ITERATIONS):
         for i in range(UNKNOWN):
             prior = PRIOR[i] if i < UNKNOWN - 1 else unsure
@@ -191,16 +191,16 @@ def solved(work: Work, lanes: Lanes, row: int, scratch: int, lane: int, told: To
         scatter, misfit = 0.0, 0.0
         for line in range(LINES):
             axis = AXIS[line]
-            told_k = told.pitch_stiffness_1_s2 if axis == 0 else told.roll_stiffness_1_s2
-            stiff, flap = told_k * exp(work[x + axis * apart]), told.flap_rate_1_s * exp(work[x + 2 * apart])
+            nominal_k = nominal.pitch_stiffness_1_s2 if axis == 0 else nominal.roll_stiffness_1_s2
+            stiff, flap = nominal_k * exp(work[x + axis * apart]), nominal.flap_rate_1_s * exp(work[x + 2 * apart])
             servo = Servo(
-                told.servo_rad_s * exp(work[x + 3 * apart]), told.servo_damping * exp(work[x + 4 * apart]),
-                answered(told.slop_rad, behind[0] if axis == 0 else behind[1]) * exp(work[x + 5 * apart]),
+                nominal.servo_rad_s * exp(work[x + 3 * apart]), nominal.servo_damping * exp(work[x + 4 * apart]),
+                answered(nominal.slop_rad, behind[0] if axis == 0 else behind[1]) * exp(work[x + 5 * apart]),
             )  # fmt: skip
             mean_re, mean_im = 0.0, 0.0
             for period in range(periods):
-                heard = line_at(work, lanes, row, period, line, lane)
-                r = residual_of(heard, OMEGA_RAD_S[line], stiff, flap, servo, told)
+                line_seen = line_at(work, lanes, row, period, line, lane)
+                r = residual_of(line_seen, OMEGA_RAD_S[line], stiff, flap, servo, nominal)
                 weight = WEIGHTS[line] * WEIGHTS[line]
                 mean_re, mean_im = mean_re + WEIGHTS[line] * r.re, mean_im + WEIGHTS[line] * r.im
                 scatter += weight * (r.re * r.re + r.im * r.im)
@@ -220,15 +220,15 @@ def solved(work: Work, lanes: Lanes, row: int, scratch: int, lane: int, told: To
             for k in range(UNKNOWN):
                 step += work[normal + (UNKNOWN * i + k) * apart] * work[slope + k * apart]
             work[x + i * apart] -= step
-    return said_of(work, normal, x, apart, variance, told)
+    return learnt_of(work, normal, x, apart, variance, nominal)
 
 
 @procedure
-def said_of(work: Work, normal: int, x: int, apart: int, variance: float, told: Told) -> Learnt:
+def learnt_of(work: Work, normal: int, x: int, apart: int, variance: float, nominal: NominalModel) -> Learnt:
     """The solution in words; normal: the first of the inverse normal equations, x: of the unknown."""
-    flap, servo = told.flap_rate_1_s * exp(work[x + 2 * apart]), told.servo_rad_s * exp(work[x + 3 * apart])
+    flap, servo = nominal.flap_rate_1_s * exp(work[x + 2 * apart]), nominal.servo_rad_s * exp(work[x + 3 * apart])
     by_flap = 1.0 / flap
-    by_servo = 2.0 * told.servo_damping * exp(work[x + 4 * apart]) / servo
+    by_servo = 2.0 * nominal.servo_damping * exp(work[x + 4 * apart]) / servo
     lag = by_flap + by_servo
     slopes = (0.0, 0.0, -by_flap / lag, -by_servo / lag, by_servo / lag, 0.0)
     spread = 0.0
@@ -239,8 +239,8 @@ def said_of(work: Work, normal: int, x: int, apart: int, variance: float, told: 
         0.0,
         0.0,
         0.0,
-        told.pitch_stiffness_1_s2 * exp(work[x]),
-        told.roll_stiffness_1_s2 * exp(work[x + apart]),
+        nominal.pitch_stiffness_1_s2 * exp(work[x]),
+        nominal.roll_stiffness_1_s2 * exp(work[x + apart]),
         flap,
         servo,
         lag,

@@ -51,7 +51,7 @@ def gains_with(gains: AutopilotGains, loops: LoopGains) -> AutopilotGains:
 
 
 @equation
-def as_told(gains: AutopilotGains) -> LoopGains:
+def loop_gains_of(gains: AutopilotGains) -> LoopGains:
     """The gains of the whole box."""
     return LoopGains(
         gains.position_gain, gains.forward_gain, gains.forward_integral, gains.gust_decay_forward, gains.right_gain,

@@ -10,7 +10,7 @@ import itertools
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from flownav.control.design import told_before
+from flownav.control.design import nominal_model
 from flownav.control.gains import AutopilotGains
 from flownav.control.learning import Learnt
 from flownav.control.learnt_gains import LoopGains, gains_with
@@ -29,11 +29,11 @@ DRAG, MASS = 0.35, 0.076  # as the box that the table was searched for (tools/le
 
 def as_learnt(vehicle: VehicleParameters, hover: Trim, learnt: Learnt) -> VehicleParameters:
     """The vehicle of the file with these stiffnesses, this flapping and these servos."""
-    told = told_before(vehicle, hover, -1)
+    nominal = nominal_model(vehicle, hover, -1)
     late = learnt.lag_s - 1.0 / learnt.flap_rate_1_s
     return vehicle._replace(
-        inertia_xx_kg_m2=vehicle.inertia_xx_kg_m2 * told.roll_stiffness_1_s2 / learnt.roll_stiffness_1_s2,
-        inertia_yy_kg_m2=vehicle.inertia_yy_kg_m2 * told.pitch_stiffness_1_s2 / learnt.pitch_stiffness_1_s2,
+        inertia_xx_kg_m2=vehicle.inertia_xx_kg_m2 * nominal.roll_stiffness_1_s2 / learnt.roll_stiffness_1_s2,
+        inertia_yy_kg_m2=vehicle.inertia_yy_kg_m2 * nominal.pitch_stiffness_1_s2 / learnt.pitch_stiffness_1_s2,
         flap_rate_1_s=learnt.flap_rate_1_s,
         cyclic_frequency_rad_s=2.0 * vehicle.cyclic_damping_ratio / late,
     )

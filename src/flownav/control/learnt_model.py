@@ -20,7 +20,7 @@ from flownav.core.frames import GRAVITY_M_S2
 LEAST_ANSWERED = 0.01  # of an error, though it is far inside the slop: what is divided by
 
 
-class Told(NamedTuple):
+class NominalModel(NamedTuple):
     """Beliefs about the vehicle before learning: k, f and the servo's (see above); blowback: B [rad per m/s].
 
     slop_rad: the dead band of servo and linkage, and slop_std_rad how sure that is.
@@ -80,16 +80,16 @@ class Line(NamedTuple):
 
 
 @equation
-def residual_of(line: Line, w: float, k: float, f: float, servo: Servo, told: Told) -> Residual:
+def residual_of(line: Line, w: float, k: float, f: float, servo: Servo, nominal: NominalModel) -> Residual:
     """D·{[(1/f - w²/(k f)) + jw/k - B g/w²] q - p/Ω} - lon, D = 1 + (2ζ s/ω + s²/ω²)/N."""
     per_f, per_k, per_servo, per_answer = 1.0 / f, 1.0 / k, 1.0 / servo.servo_rad_s, 1.0 / servo.answers
     stiff, damped = w * w * per_k * per_f, w * per_k
-    drift = told.blowback * GRAVITY_M_S2 / (w * w)
+    drift = nominal.blowback * GRAVITY_M_S2 / (w * w)
     held, late = w * w * per_servo * per_servo * per_answer, 2.0 * servo.damping * w * per_servo * per_answer
     d_re, d_im = 1.0 - held, late
     real = per_f - stiff - drift
-    x_re = real * line.rate_re - damped * line.rate_im - told.per_rotor_speed_s * line.other_re
-    x_im = real * line.rate_im + damped * line.rate_re - told.per_rotor_speed_s * line.other_im
+    x_re = real * line.rate_re - damped * line.rate_im - nominal.per_rotor_speed_s * line.other_re
+    x_im = real * line.rate_im + damped * line.rate_re - nominal.per_rotor_speed_s * line.other_im
     by_k_re, by_k_im = stiff * line.rate_re + damped * line.rate_im, stiff * line.rate_im - damped * line.rate_re
     by_f_re, by_f_im = (stiff - per_f) * line.rate_re, (stiff - per_f) * line.rate_im
     return Residual(

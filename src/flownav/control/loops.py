@@ -199,17 +199,17 @@ def _outer_map(g: AutopilotGains, timing: Timing, factor: Mapping[str, float], r
     for axis in "ne":  # means over the period that has passed, as the accelerometer has them
         mean = (rows.seen[f"vel_{axis}"] - rows.of[f"before_{axis}"]) / timing.outer_s
         now[f"felt_{axis}"] = mean + 0.5 * GRAVITY_M_S2 * (tilt[axis] + rows.of[f"tilt_before_{axis}"])
-    said = {name: rows.of[f"{name}_{periods - 1}"] if periods else now[name] for name in LATE}
-    ask = {axis: -factor[f"vel_{axis}_command"] * g.position_gain * said[f"pos_{axis}"] for axis in "ne"}
-    error = {axis: ask[axis] - said[f"vel_{axis}"] for axis in "ne"}
-    down = -factor["vel_d_command"] * g.height_gain * said["pos_d"] - said["vel_d"]
+    stated = {name: rows.of[f"{name}_{periods - 1}"] if periods else now[name] for name in LATE}
+    ask = {axis: -factor[f"vel_{axis}_command"] * g.position_gain * stated[f"pos_{axis}"] for axis in "ne"}
+    error = {axis: ask[axis] - stated[f"vel_{axis}"] for axis in "ne"}
+    down = -factor["vel_d_command"] * g.height_gain * stated["pos_d"] - stated["vel_d"]
     found = np.eye(rows.count)
     accel = {}
     for axis, name, gain, integral, decay in (
         ("n", "forward", g.forward_gain, g.forward_integral, g.gust_decay_forward),
         ("e", "right", g.right_gain, g.right_integral, g.gust_decay_right),
     ):  # fmt: skip
-        gust = decay * rows.of[f"gust_{name}"] + (1.0 - decay) * said[f"felt_{axis}"]
+        gust = decay * rows.of[f"gust_{name}"] + (1.0 - decay) * stated[f"felt_{axis}"]
         accel[axis] = gain * error[axis] + rows.of[f"{name}_sum"] - g.gust_share * gust
         found[rows.place[f"gust_{name}"]] = gust
         found[rows.place[f"{name}_sum"]] = rows.of[f"{name}_sum"] + integral * timing.outer_s * error[axis]

@@ -54,8 +54,8 @@ def margins_over_box(path: Path | None = None, *, feels_gusts: bool = True) -> B
     Each corner is judged with the inflow in balance at once, and held; a helicopter's also with its inflow's lag and a
     rotor speed that droops. InputError as `load_vehicle` and, for the nominal vehicle, `trim`.
     """
-    told = load_vehicle(path)
-    gains = gains_for(told, hover_of(told), 0.0, feels_gusts=feels_gusts)
+    vehicle_ = load_vehicle(path)
+    gains = gains_for(vehicle_, hover_of(vehicle_), 0.0, feels_gusts=feels_gusts)
     rows: list[LoopMargins] = []
     lost: list[str] = []
     for corner in corners(path):

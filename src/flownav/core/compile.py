@@ -20,7 +20,6 @@ number of threads.
 from collections.abc import Callable
 from typing import Any
 
-from flownav.core.compiling.beside import begin_beside, compile_beside, meanwhile
 from flownav.core.compiling.bundles import (
     FlatAccess,
     columns_of,
@@ -52,6 +51,7 @@ from flownav.core.compiling.elementary import (
     sinh,
 )
 from flownav.core.compiling.engine import LANES_WIDE, equation, kernel, procedure, sparingly
+from flownav.core.compiling.parallel import begin_in_parallel, compile_in_parallel, meanwhile
 from flownav.core.compiling.pointers import invoke, pointer
 from flownav.core.compiling.progress import announce_compilation
 from flownav.core.compiling.records import Layout, OnLanes, compiled, dressed

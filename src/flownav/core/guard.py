@@ -96,13 +96,13 @@ def object_in(path: Path, advice: str, most: int = MOST_JSON_BYTES) -> dict[str,
             text = file.read(most + 1)
         if len(text) > most:
             raise ValueError(f"it has more than {most} bytes")
-        said = json.loads(text)
+        content = json.loads(text)
     except (OSError, ValueError, RecursionError) as error:
         reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:LONGEST_SHOWN]
         raise InputError(f"{path}: cannot be read ({reason}); {advice}") from error
-    if not isinstance(said, dict):
+    if not isinstance(content, dict):
         raise InputError(f"{path}: cannot be read (it holds no object); {advice}")
-    return said
+    return content
 
 
 def inputs_there(paths: Iterable[Path], what: str) -> None:

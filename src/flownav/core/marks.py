@@ -115,18 +115,18 @@ def manifest_of(path: Path) -> dict[str, Any] | None:
             if MANIFEST not in names or not all(name == MANIFEST or name.endswith(TABLE) for name in names):
                 return None
             with bundle.open(MANIFEST) as file:
-                said = json.loads(file.read(MOST_JSON_BYTES))
+                parsed = json.loads(file.read(MOST_JSON_BYTES))
     except ZIP_ERRORS:
         return None
-    return said if isinstance(said, dict) and isinstance(said.get("schema"), int) else None
+    return parsed if isinstance(parsed, dict) and isinstance(parsed.get("schema"), int) else None
 
 
 def _is_our_json(text: bytes) -> bool:
     try:
-        said = json.loads(text)
+        parsed = json.loads(text)
     except (ValueError, RecursionError):
         return False
-    return isinstance(said, dict) and said.pop(KEY, None) == _digest(said)
+    return isinstance(parsed, dict) and parsed.pop(KEY, None) == _digest(parsed)
 
 
 def _is_our_page(head: bytes, rest: BufferedReader) -> bool:

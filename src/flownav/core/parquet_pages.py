@@ -41,22 +41,22 @@ def read_footer(data: bytes) -> Footer:
         raise ValueError("not a Parquet file")
     if length > MOST_FOOTER:
         raise ValueError("its footer is too long")
-    said, _ = _structure(data[-8 - length : -8], 0, 0)
-    groups = said.get(GROUPS) or []
+    meta, _ = _structure(data[-8 - length : -8], 0, 0)
+    groups = meta.get(GROUPS) or []
     rows: list[int] = [_number(group, GROUP_ROWS) for group in groups]
-    if sum(rows) != _number(said, ROWS) or (any(rows) and 0 in rows):
+    if sum(rows) != _number(meta, ROWS) or (any(rows) and 0 in rows):
         raise ValueError("its parts do not have the rows that it says")
     return Footer(rows, [[_chunk(column) for column in group.get(GROUP_COLUMNS) or []] for group in groups])
 
 
 def _chunk(column: dict[int, Any]) -> Chunk:
-    said = column.get(CHUNK)
-    if not isinstance(said, dict) or OTHER_FILE in column:
+    meta = column.get(CHUNK)
+    if not isinstance(meta, dict) or OTHER_FILE in column:
         raise ValueError("a column lies elsewhere")
-    at, dictionary_at = _number(said, DATA_AT), said.get(DICTIONARY_AT)
+    at, dictionary_at = _number(meta, DATA_AT), meta.get(DICTIONARY_AT)
     if isinstance(dictionary_at, int) and 0 < dictionary_at < at:
         at = dictionary_at
-    return Chunk(at, _number(said, STORED), _number(said, GROWN))
+    return Chunk(at, _number(meta, STORED), _number(meta, GROWN))
 
 
 def check_pages(data: bytes, footer: Footer) -> None:

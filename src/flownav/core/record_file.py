@@ -85,7 +85,7 @@ def save(manifest: dict[str, Any], tables: Tables, path: Path, *, replacing: boo
             columns, entry = table_of(table), zipfile.ZipInfo(f"{name}.parquet")
             with bundle.open(entry, "w", force_zip64=columns.nbytes >= zipfile.ZIP64_LIMIT) as stream:
                 words = [one.name for one in columns.schema if not pa.types.is_primitive(one.type)]  # each kept once
-                pq.write_table(columns, pa.PythonFile(_Told(stream), "w"), compression="zstd", use_dictionary=words)
+                pq.write_table(columns, pa.PythonFile(_Counted(stream), "w"), compression="zstd", use_dictionary=words)
             del columns
             pa.default_memory_pool().release_unused()
 
@@ -162,19 +162,19 @@ def _checked_members(bundle: zipfile.ZipFile, size: int) -> list[str]:
 def _manifest(text: bytes, path: Path, newest: int) -> dict[str, Any]:
     """The manifest as it stands, its keys checked."""
     try:
-        said = json.loads(text)
+        content = json.loads(text)
     except RecursionError as error:
         raise ValueError(f"{MANIFEST} is nested too deep") from error
-    if not isinstance(said, dict):
+    if not isinstance(content, dict):
         raise ValueError(f"{MANIFEST} is no object")
-    if isinstance(said.get("schema"), int) and said["schema"] > newest:
-        raise InputError(f"{path}: record schema {said['schema']} is newer than this flownav; update flownav")
+    if isinstance(content.get("schema"), int) and content["schema"] > newest:
+        raise InputError(f"{path}: record schema {content['schema']} is newer than this flownav; update flownav")
     try:
-        Manifest.model_validate({"schema": 0, **said})
+        Manifest.model_validate({"schema": 0, **content})
     except ValidationError as error:
         first = error.errors()[0]
         raise ValueError(f"{MANIFEST}: {'.'.join(map(str, first['loc'][:2]))}: {first['msg']}") from error
-    return said
+    return content
 
 
 def _check_tables(bundle: zipfile.ZipFile, names: list[str], size: int, known: Mapping[str, tuple[str, ...]]) -> None:
@@ -273,7 +273,7 @@ def _column(name: str, found: Any) -> Column:
         raise ValueError(f"column {name} has {error}") from None
 
 
-class _Told:
+class _Counted:
     """A file within a zip as Arrow writes to it, which asks how far it has come."""
 
     closed = False

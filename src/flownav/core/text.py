@@ -77,8 +77,8 @@ def finite(value: Any) -> Any:
 
 def exactly(value: float, times: int = 1) -> str:
     """A finite number, or a multiple of it, in as many decimals as it takes to tell it from every other."""
-    said = Decimal(repr(float(value))) * times
-    return f"{said.normalize() if said else Decimal(0):f}"
+    shown = Decimal(repr(float(value))) * times
+    return f"{shown.normalize() if shown else Decimal(0):f}"
 
 
 def plain(text: str) -> str:

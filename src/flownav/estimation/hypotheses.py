@@ -75,7 +75,7 @@ def followed(work: Work, lanes: Lanes) -> int:
 
 
 @equation
-def size_told(work: Work, lanes: Lanes, fault: int, lane: int, prior_sigma: float) -> Size:
+def size_from_evidence(work: Work, lanes: Lanes, fault: int, lane: int, prior_sigma: float) -> Size:
     """Size of a fault in a lane by its innovations."""
     information, score = work[(INFORMATION + fault) * len(lanes) + lane], work[(SCORE + fault) * len(lanes) + lane]
     return size_of(information, score, prior_sigma)

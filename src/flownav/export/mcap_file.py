@@ -175,12 +175,12 @@ def _rows(table: Table) -> Iterator[Row]:
     there.
     """
 
-    def said(value: Any) -> bool:
+    def is_stated(value: Any) -> bool:
         return value is not None and not (isinstance(value, float) and not math.isfinite(value))
 
     columns = [texts(values) if is_text(values) else values.tolist() for values in table.values()]
     for row in zip(*columns, strict=True):
-        yield {name: value for name, value in zip(table, row, strict=True) if said(value)}
+        yield {name: value for name, value in zip(table, row, strict=True) if is_stated(value)}
 
 
 # -- the layout ---------------------------------------------------------------------------------------------

@@ -209,8 +209,8 @@ def table_topic(name: str, table: Table, shift_s: float) -> Topic:
         topic, fields = PX4[name](kept)
         return Topic(topic, time_us, fields)
     numbers = {key: column for key, column in kept.items() if key != "t_s" and not is_text(column)}
-    fields = [Field("double", _spelled(key), column.astype(float)) for key, column in numbers.items()]
-    return Topic(f"flownav_{_spelled(name)}", time_us, fields)
+    fields = [Field("double", _ulog_name(key), column.astype(float)) for key, column in numbers.items()]
+    return Topic(f"flownav_{_ulog_name(name)}", time_us, fields)
 
 
 def innovation_topics(table: Table, shift_s: float) -> tuple[list[Topic], list[str]]:
@@ -230,7 +230,9 @@ def innovation_topics(table: Table, shift_s: float) -> tuple[list[Topic], list[s
     for name in dict.fromkeys(whose.tolist()):
         of = whose == name
         fields = [column._replace(values=column.values[of]) for column in columns]
-        topics.append(Topic(f"flownav_innovation_{_spelled(name)}", stamps(kept["t_s"][of], US_PER_S, shift_s), fields))
+        topics.append(
+            Topic(f"flownav_innovation_{_ulog_name(name)}", stamps(kept["t_s"][of], US_PER_S, shift_s), fields)
+        )
     return topics, reasons
 
 
@@ -285,6 +287,6 @@ PX4_NEEDS = {
 }
 
 
-def _spelled(name: str) -> str:
+def _ulog_name(name: str) -> str:
     """A name in the letters that ULog allows."""
     return re.sub(r"[^A-Za-z0-9_]", "_", name)

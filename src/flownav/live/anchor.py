@@ -89,7 +89,7 @@ class Anchor:
 
 def holds(on: Running) -> bool:
     """Whether GPS has given the position within UNHELD_S."""
-    return bool(on.clock_s <= load_gps(on.work, ONE_LANE, 0).told_s + UNHELD_S)
+    return bool(on.clock_s <= load_gps(on.work, ONE_LANE, 0).last_fix_s + UNHELD_S)
 
 
 def place_variance(work: Array) -> float:

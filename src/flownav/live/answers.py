@@ -67,13 +67,13 @@ def why_withheld(on: Running | None, t_s: float, newest_s: float, limits: Limits
     """
     if on is None:
         return "listening"
-    told, aid, imu = on.told, load_aid(on.work, ONE_LANE, 0), load_imu(on.work, ONE_LANE, 0)
+    given, aid, imu = on.given, load_aid(on.work, ONE_LANE, 0), load_imu(on.work, ONE_LANE, 0)
     if load_start(on.work, ONE_LANE, 0).started == 0.0:
         return "not_started"
-    imu_stale = told.equipment.use_imu and not on.clock_s - imu.read_s <= told.imu.imu_stale_s
+    imu_stale = given.equipment.use_imu and not on.clock_s - imu.read_s <= given.imu.imu_stale_s
     if imu_stale or not t_s - newest_s <= limits.age_s or not t_s - on.clock_s <= LONGEST_AHEAD_S:
         return "stale"
-    if aid.flag >= INVALID_FLAG or on.clock_s - aid.aided_s > told.aid.invalid_s:
+    if aid.flag >= INVALID_FLAG or on.clock_s - aid.aided_s > given.aid.invalid_s:
         return "position_invalid"
     if t_s - aid.aided_s > limits.dead_reckoning_s:
         return "dead_reckoning"
@@ -106,7 +106,7 @@ def estimate_of(
         (north_m, east_m, down_m),
         tuple(now.vel_ned_m_s.tolist()),
         tuple(now.quaternion.tolist()),
-        tuple(now.rate_frd_rad_s.tolist()) if on.told.equipment.use_imu else (math.nan,) * 3,
+        tuple(now.rate_frd_rad_s.tolist()) if on.given.equipment.use_imu else (math.nan,) * 3,
         pose,
         velocity,
         resets,

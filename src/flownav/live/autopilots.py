@@ -38,7 +38,7 @@ def standing(component: int, kind: int, make: int, *, named: bool = False) -> in
 
 
 @dataclass
-class Heard:
+class Candidate:
     """A sender that may be the autopilot.
 
     moves, places: whether it sent its motion and its position. turn_s: our clock when it was taken, None while it
@@ -53,13 +53,13 @@ class Heard:
     turn_s: float | None = None
 
     @property
-    def told(self) -> int:
+    def needs_met(self) -> int:
         """The number of the two needed kinds of message (motion, position) that it has sent: 0, 1 or 2."""
         return self.moves + self.places
 
     def may_serve(self, now_s: float, *, taken: bool) -> bool:
         """Whether it has sent both, or still has time to; taken: it is the one in use."""
-        return self.told == 2 or self.turn_s is None or (taken and now_s - self.turn_s <= TURN_S)
+        return self.needs_met == 2 or self.turn_s is None or (taken and now_s - self.turn_s <= TURN_S)
 
 
 class Autopilots:
@@ -67,37 +67,39 @@ class Autopilots:
 
     def __init__(self, component: int | None = None) -> None:
         self._named = component is not None
-        self.heard: dict[Who, Heard] = {}
+        self.candidates: dict[Who, Candidate] = {}
         self._moves, self._places = map(_numbers, (MOVES, PLACES))
 
-    def heartbeat(self, who: Who, message: Message) -> Heard | None:
+    def heartbeat(self, who: Who, message: Message) -> Candidate | None:
         """Note its sender; None where that is no autopilot."""
         make = int(message.autopilot)
         found = standing(who[1], int(message.type), make, named=self._named)
-        if found == NONE or (who not in self.heard and len(self.heard) >= MOST):
+        if found == NONE or (who not in self.candidates and len(self.candidates) >= MOST):
             return None
-        known = self.heard.setdefault(who, Heard(who, make, found))
+        known = self.candidates.setdefault(who, Candidate(who, make, found))
         known.standing = max(known.standing, found)
         return known
 
-    def told(self, who: Who, number: int) -> None:
+    def received(self, who: Who, number: int) -> None:
         """A message of one of them."""
-        known = self.heard.get(who)
+        known = self.candidates.get(who)
         if known is not None:
             known.moves = known.moves or number in self._moves
             known.places = known.places or number in self._places
 
-    def better(self, who: Who, now_s: float) -> Heard | None:
+    def better(self, who: Who, now_s: float) -> Candidate | None:
         """Who is to be taken in place of the one that is; None where nobody is better."""
-        current, heard = self.heard.get(who), list(self.heard.values())
+        current, candidates = self.candidates.get(who), list(self.candidates.values())
         if current is None:
             return None
         current.turn_s = now_s if current.turn_s is None else current.turn_s
-        serving = [one for one in heard if one.may_serve(now_s, taken=one is current)]
+        serving = [one for one in candidates if one.may_serve(now_s, taken=one is current)]
         if serving:
-            best = max(serving, key=lambda one: (one.told == 2, one.standing, one.told, one is current))
+            best = max(serving, key=lambda one: (one.needs_met == 2, one.standing, one.needs_met, one is current))
         else:  # of those that send neither one after the other is asked
-            best = max(heard, key=lambda one: (one.told, one is current and one.told > 0, -(one.turn_s or 0.0)))
+            best = max(
+                candidates, key=lambda one: (one.needs_met, one is current and one.needs_met > 0, -(one.turn_s or 0.0))
+            )
         if best is current:
             return None
         best.turn_s = now_s

@@ -15,7 +15,7 @@ RECONNECT_S = 1.0  # for a call to be answered: chosen
 ALONE = getattr(socket, "MSG_EOR", 0)  # or Linux appends a message to one that waits, without a look at the bound
 SENDING_BYTES = 8192  # of the kernel's own buffer: chosen; with its bookkeeping a dozen estimates on their way
 NOTSENT_LOWAT = 25  # TCP_NOTSENT_LOWAT of Linux, which Python does not name: bytes that may wait to be sent
-UNHEARD_MS = 5000  # a peer that acknowledges nothing for so long is gone: chosen; the kernel's own takes minutes
+UNACKNOWLEDGED_MS = 5000  # a peer that acknowledges nothing for so long is gone: chosen; the kernel's own takes minutes
 
 
 class ByteLink(Link):
@@ -93,7 +93,7 @@ class TcpLink(ByteLink):
         connection.setblocking(False)
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         with suppress(OSError, AttributeError):  # Linux
-            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNHEARD_MS)
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNACKNOWLEDGED_MS)
         with suppress(OSError):  # Linux; what may not go now waits where a newer estimate takes its place
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SENDING_BYTES)
             connection.setsockopt(socket.IPPROTO_TCP, NOTSENT_LOWAT, 1)

@@ -13,6 +13,7 @@ from flownav.estimation.states import POSITION, STATE
 from flownav.live.options import Options
 from flownav.logs.mavlink.messages import TrueState
 from flownav.navigation.feed import equipment_of
+from flownav.navigation.kernel_settings import FROM_MAG, NO_HEADING, Equipment
 from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.memory import load_start
 from flownav.navigation.now import NowRow
@@ -20,7 +21,6 @@ from flownav.navigation.rings import Given, Rings, numbers_of
 from flownav.navigation.rows import EVENT_COLUMNS, INNOVATION_COLUMNS, EventRow
 from flownav.navigation.tables import written_on
 from flownav.navigation.tape import COMPONENTS, GPS_RESET, START, empty_tape
-from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
 from flownav.navigation.waiting_records import Sizes
 from flownav.sensors.datasheet import UNTURNED, IdentifiedFlow, in_vehicle_axes
 
@@ -78,7 +78,7 @@ class Filtering:
         most = max(COMPONENTS.values())
         self._tape = empty_tape(BATCH_READINGS + 2, most * BATCH_READINGS, 8 * BATCH_READINGS + 8)
 
-    def begin(self, gps_heard: bool, origin_deg_m: tuple[float, float, float] | None = None) -> None:
+    def begin(self, gps_received: bool, origin_deg_m: tuple[float, float, float] | None = None) -> None:
         """A navigator for the sensors that were listened to, whose readings wait. gps_heard: a receiver is there that
         has had a fix.
 
@@ -87,12 +87,12 @@ class Filtering:
         """
         listened = self.rings.waiting()
         streams = _streams(listened)
-        if gps_heard and Sensor.GPS_POSITION not in streams:
+        if gps_received and Sensor.GPS_POSITION not in streams:
             streams[Sensor.GPS_POSITION] = Stream.of(Sensor.GPS_POSITION, np.zeros(0), np.zeros((0, 3)))
         first_s = float(listened.t_s[0])
         settings = self._options.settings
         equipment = equipment_of(streams, first_s, _own_gyro_is_dead(streams), settings, origin_deg_m)
-        if gps_heard:
+        if gps_received:
             equipment = equipment._replace(deadline_s=first_s + float(settings.start_wait_s))
         elif equipment.heading == NO_HEADING and Sensor.MAG in streams:
             equipment = equipment._replace(heading=FROM_MAG)
@@ -147,19 +147,19 @@ class Filtering:
     @property
     def lacks_imu(self) -> bool:
         """Whether a navigator runs that was set up without an IMU."""
-        return self.running is not None and not self.running.told.equipment.use_imu
+        return self.running is not None and not self.running.given.equipment.use_imu
 
     @property
     def lacks_gps(self) -> bool:
         """Whether a navigator runs that was set up without a GPS receiver."""
-        return self.running is not None and not np.isfinite(self.running.told.equipment.deadline_s)
+        return self.running is not None and not np.isfinite(self.running.given.equipment.deadline_s)
 
     def imu_rate_hz(self, t_s: float) -> float:
         """Rate of the IMU's readings in the two seconds before an instant."""
         return 0.5 * float(np.count_nonzero(self.rings.inertial()[:, 0] > t_s - 2.0))
 
 
-def handed_over(reading: Measurement, exposure_s: float, known: IdentifiedFlow | None) -> Given:
+def given_of(reading: Measurement, exposure_s: float, known: IdentifiedFlow | None) -> Given:
     """A reading as the rings take it: flow in the vehicle's axes."""
     value: Sequence[float] = reading.value
     if reading.sensor in FLOW and known is not None and known.axes != UNTURNED:

@@ -40,7 +40,7 @@ class Source(NamedTuple):
 class _Chosen(NamedTuple):
     source: Source
     rank: tuple[int, bool, int]
-    heard_s: float
+    received_s: float
 
 
 class Sources:
@@ -85,7 +85,7 @@ class Sources:
     def alive(self, sensor: Sensor, t_s: float) -> bool:
         """Whether the source that serves has spoken lately."""
         chosen = self._chosen.get(sensor)
-        return chosen is not None and abs(t_s - chosen.heard_s) <= SILENT_S
+        return chosen is not None and abs(t_s - chosen.received_s) <= SILENT_S
 
     def names(self) -> dict[str, str]:
         """The message that serves for each sensor."""
@@ -106,7 +106,7 @@ class Lags:
         self._newest_s = float("-inf")
         self._windows: dict[Sensor, deque[tuple[float, float]]] = {}  # begin, greatest lag [s]
 
-    def heard(self, sensor: Sensor, instant_s: float) -> None:
+    def received(self, sensor: Sensor, instant_s: float) -> None:
         """A reading that describes an instant."""
         self._newest_s = max(self._newest_s, instant_s)
         lag_s = self._newest_s - instant_s

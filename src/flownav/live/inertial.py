@@ -56,7 +56,7 @@ class Usual(NamedTuple):
     by_chance: float
 
 
-class _Heard:
+class _SourceHistory:
     """The recent readings of one source, and since when its accelerometer has repeated one value."""
 
     def __init__(self) -> None:
@@ -135,22 +135,22 @@ class Inertial:
     """The inertial sensors of a vehicle, compared with each other."""
 
     def __init__(self) -> None:
-        self._heard: dict[Source, _Heard] = {}
+        self._histories: dict[Source, _SourceHistory] = {}
 
     def clear(self) -> None:
         """Begin anew."""
-        self._heard.clear()
+        self._histories.clear()
 
-    def heard(
+    def received(
         self, source: Source, reading: Measurement, serves: Source | None, barred: Collection[Source] = ()
     ) -> Swap | None:
         """A reading of a source; what must be done where the one that serves is found wrong by it.
 
         barred: those that are not believed.
         """
-        heard = self._heard.setdefault(source, _Heard())
-        heard.take(Sample(reading.t_s, reading))
-        own = self._heard.get(serves) if serves is not None else None
+        history = self._histories.setdefault(source, _SourceHistory())
+        history.take(Sample(reading.t_s, reading))
+        own = self._histories.get(serves) if serves is not None else None
         if serves is None or own is None or not own.kept:
             return None
         if own.stuck:
@@ -158,34 +158,38 @@ class Inertial:
         if source == serves and self._contradicted(serves, reading.t_s, barred):
             own.erred_s = reading.t_s
             return self._swap(serves, reading.t_s - BEFORE_S, "contradicted", barred)
-        if source in barred and differ(own.usual(reading.t_s), heard.usual(reading.t_s)):
-            heard.erred_s = reading.t_s
+        if source in barred and differ(own.usual(reading.t_s), history.usual(reading.t_s)):
+            history.erred_s = reading.t_s
         return None
 
     def _swap(self, serves: Source, since_s: float, why: str, barred: Collection[Source]) -> Swap:
         """The replacement of a source: the readings since `since_s` of the first other source that is alive."""
-        alive = self._alive(serves, self._heard[serves].kept[-1].t_s, barred)
+        alive = self._alive(serves, self._histories[serves].kept[-1].t_s, barred)
         return Swap(
             serves, since_s, why, [sample for sample in alive[0].kept if sample.t_s >= since_s] if alive else []
         )
 
     def recovered(self, source: Source, t_s: float, *, alone: bool) -> bool:
         """Whether a source that erred agrees with one that does not. alone: none serves, so that none contradicts."""
-        heard = self._heard.get(source)
-        return heard is not None and t_s - heard.erred_s >= (RECOVERED_S if alone else AGREED_S)
+        history = self._histories.get(source)
+        return history is not None and t_s - history.erred_s >= (RECOVERED_S if alone else AGREED_S)
 
-    def _alive(self, serves: Source, t_s: float, barred: Collection[Source]) -> list[_Heard]:
+    def _alive(self, serves: Source, t_s: float, barred: Collection[Source]) -> list[_SourceHistory]:
         """Other sources that send readings, are not barred and are not stuck."""
-        believed = (heard for source, heard in self._heard.items() if source != serves and source not in barred)
-        return [heard for heard in believed if heard.kept and t_s - heard.kept[-1].t_s <= LOOK_S and not heard.stuck]
+        believed = (history for source, history in self._histories.items() if source != serves and source not in barred)
+        return [
+            history
+            for history in believed
+            if history.kept and t_s - history.kept[-1].t_s <= LOOK_S and not history.stuck
+        ]
 
     def _contradicted(self, serves: Source, t_s: float, barred: Collection[Source]) -> bool:
         """Whether the source in use contradicts all others, or, of two, measures gravity less well than the other."""
         alive = self._alive(serves, t_s, barred)
-        own = self._heard[serves].usual(t_s) if alive else None
+        own = self._histories[serves].usual(t_s) if alive else None
         if own is None:
             return False
-        others = [other for other in (heard.usual(t_s) for heard in alive) if other is not None]
+        others = [other for other in (history.usual(t_s) for history in alive) if other is not None]
         against = [other for other in others if differ(own, other)]
         if not against or len(against) < len(others):
             return False
@@ -211,12 +215,12 @@ class Heights:
     """
 
     def __init__(self) -> None:
-        self._said: dict[Sensor, tuple[float, float, bool]] = {}  # when, how much higher [m], whether refused
+        self._refusals: dict[Sensor, tuple[float, float, bool]] = {}  # when, how much higher [m], whether refused
         self._doubted_s = math.nan
 
     def clear(self) -> None:
         """Begin anew."""
-        self._said.clear()
+        self._refusals.clear()
         self._doubted_s = math.nan
 
     def judged(self, rows: Iterable[InnovationRow[float]]) -> None:
@@ -227,11 +231,11 @@ class Heights:
             if sign is None or reason not in (Reason.FUSED, Reason.INNOVATION_GATE):
                 continue
             higher_m = sign * row.innovation
-            self._said[Sensor(int(row.sensor))] = row.t_s, higher_m, reason == Reason.INNOVATION_GATE
+            self._refusals[Sensor(int(row.sensor))] = row.t_s, higher_m, reason == Reason.INNOVATION_GATE
             lately = [
                 (much_m, refused)
-                for said_s, much_m, refused in self._said.values()
-                if row.t_s - said_s <= TOGETHER_S and abs(much_m) >= HIGHER_M and much_m * higher_m > 0.0
+                for stated_s, much_m, refused in self._refusals.values()
+                if row.t_s - stated_s <= TOGETHER_S and abs(much_m) >= HIGHER_M and much_m * higher_m > 0.0
             ]
             if len(lately) > 1 and any(refused for _, refused in lately):
                 self._doubted_s = row.t_s

@@ -78,7 +78,7 @@ def warm_up() -> None:
         for reading in readings:
             filtering.rings.take(reading)
         filtering.rings.take_back(0.15)
-        filtering.begin(gps_heard=True)
+        filtering.begin(gps_received=True)
         filtering.feed(math.inf)
         assert filtering.running is not None
         estimate = estimate_of(filtering.running, filtering.now(1.0), 1.0, 1.0, 0)

@@ -7,9 +7,9 @@ from flownav.live.anchor import PLACES, Anchor
 from flownav.live.answers import UNFUSED, estimate_of, fault_of, why_withheld
 from flownav.live.beginning import ANEW, Beginning
 from flownav.live.filtering import Filtering, Keeper
-from flownav.live.hearing import GPS, WALKS, Hearing
 from flownav.live.horizon import Refused
 from flownav.live.inertial import Heights
+from flownav.live.intake import GPS, WALKS, Intake
 from flownav.live.options import Limits
 from flownav.live.origin import Geodetic
 from flownav.live.vehicle_clock import VehicleClock
@@ -29,8 +29,8 @@ class Offering:
     settled: an estimate was there to be sent, so that the vehicle is the vehicle.
     """
 
-    def __init__(self, limits: Limits, keeper: Keeper, hearing: Hearing, filtering: Filtering) -> None:
-        self.limits, self.keeper, self.hearing, self.filtering = limits, keeper, hearing, filtering
+    def __init__(self, limits: Limits, keeper: Keeper, intake: Intake, filtering: Filtering) -> None:
+        self.limits, self.keeper, self.intake, self.filtering = limits, keeper, intake, filtering
         self.anchor, self.heights = Anchor(), Heights()
         self.alarms: dict[Sensor, Refused] = {}
         self.past_alarms: dict[Sensor, Refused] = {}
@@ -46,13 +46,13 @@ class Offering:
         One that begins in flight without GPS begins at 0, and its height above the ground is the range: the sent
         position is relative to the ground below, until an origin and a fix arrive.
         """
-        north_m, east_m, down_m = self.hearing.origin.offset_ned_m
+        north_m, east_m, down_m = self.intake.origin.offset_ned_m
         unknown = not (north_m or east_m or down_m)
         return north_m, east_m, down_m - self.beginning.raised_m if unknown else down_m
 
     def _begin(self, t_s: float) -> None:
         """How high a navigator is that has just started goes into the record."""
-        above, landed = (self.hearing.latest.get(sensor) for sensor in (Sensor.RANGE, Sensor.LANDED))
+        above, landed = (self.intake.latest.get(sensor) for sensor in (Sensor.RANGE, Sensor.LANDED))
         by = self.beginning.watch(above, landed, t_s)
         if by == ANEW:
             self.keeper.note(t_s, "live", "restart", "range and autopilot agree on the height now", NAN)
@@ -63,7 +63,7 @@ class Offering:
     def asks_where(self, t_s: float) -> bool:
         """Whether the autopilot is to be asked for its own position from now on: it decides about an origin, or about
         the height of a navigator that begins in flight."""
-        doubted, opened = self.hearing.origin.doubted, self.beginning.is_open
+        doubted, opened = self.intake.origin.doubted, self.beginning.is_open
         asks = doubted not in (None, self._doubted) or (opened and not self._opened)
         if doubted not in (None, self._doubted):
             detail = "it is far off; the autopilot is asked where it is in it"
@@ -82,8 +82,8 @@ class Offering:
         self._begin(t_s)
         if self.filtering.running is not None:
             self.anchor.watch(self.filtering.running, t_s)
-        self.hearing.flow_agrees = self.anchor.agrees(t_s)
-        found = self.hearing.serving.alarms(t_s, self.limits.unfused_s)
+        self.intake.flow_agrees = self.anchor.agrees(t_s)
+        found = self.intake.serving.alarms(t_s, self.limits.unfused_s)
         for sensor in found.keys() - self.alarms.keys():
             spell = found[sensor]
             self.keeper.note(t_s, sensor.name.lower(), "unfused", spell.why, t_s - spell.since_s)
@@ -106,16 +106,16 @@ class Offering:
         be sent either."""
         on, limits = self.filtering.running, self.limits
         base = self.anchor.base
-        reason = why_withheld(on, t_s, self.hearing.newest_s, limits, base)
+        reason = why_withheld(on, t_s, self.intake.newest_s, limits, base)
         if reason in OUTRANKED and any(self._spoils(sensor, t_s) for sensor in self.alarms):
             reason = UNFUSED
-        if not reason and on is not None and on.told.equipment.use_imu:
+        if not reason and on is not None and on.given.equipment.use_imu:
             reason = "" if t_s - self.filtering.newest_imu_s <= limits.age_s else "stale"
         if on is not None and self.heights.doubted(on.clock_s) and reason in ("", *PLACES):
             reason = HEIGHT_DOUBTED
         if self.beginning.is_open and reason in ("", *PLACES):
             reason = BEGINS_IN_FLIGHT
-        if not reason and not self.settled and self.hearing.origin.doubted is not None:
+        if not reason and not self.settled and self.intake.origin.doubted is not None:
             reason = "origin_doubted"
         if on is None or (reason and reason not in PLACES):
             return reason, None
@@ -128,10 +128,10 @@ class Offering:
 
     def say_origin(self, event: str, t_s: float) -> None:
         """Record what happened to the autopilot's origin."""
-        origin = self.hearing.origin
+        origin = self.intake.origin
         if event == "moved":
             offset_m = sum(value**2 for value in origin.offset_ned_m) ** 0.5
             self.keeper.note(t_s, "origin", "moved", "the autopilot set its origin; what is sent is about it", offset_m)
         elif event == "refused":
-            self.hearing.counts["origin: refused"] += 1
+            self.intake.counts["origin: refused"] += 1
             self.keeper.note(t_s, "origin", "refused", "the vehicle is not where this origin would have it")

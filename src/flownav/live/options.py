@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from flownav.live.reception import BESIDE, Accepted
+from flownav.navigation.kernel_settings import NO_STATED_NOISE, FlowNoise
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
 from flownav.sensors.datasheet import IdentifiedFlow
 
 Sending = Literal["odometry", "vision", "landing-target", "none"]

@@ -34,15 +34,15 @@ class Origin:
         self.moves = self.refused = 0
         self.doubted: Geodetic | None = None
         self._agreed = 0  # positions in a row that fit the doubted one, less than 0 those that fit the other
-        self._told: Geodetic | None = None
+        self._received: Geodetic | None = None
         self._fix: Geodetic | None = None
 
     @property
     def about_deg_m(self) -> Geodetic | None:
         """The geodetic place of the navigator's origin, else the one that the autopilot sent; None without either."""
-        return self.navigator_deg_m or self._told
+        return self.navigator_deg_m or self._received
 
-    def told(self, place: Geodetic, *, settled: bool = False) -> str:
+    def received(self, place: Geodetic, *, settled: bool = False) -> str:
         """GPS_GLOBAL_ORIGIN: "" where nothing changes, `moved`, `refused`, `doubted`. settled: an estimate was sent."""
         if not can_be(place, self._fix):
             self.refused += 1
@@ -51,7 +51,7 @@ class Origin:
             self._agreed = 0 if place != self.doubted else self._agreed
             self.doubted = place
             return "doubted"
-        self._told, self.doubted = place, None
+        self._received, self.doubted = place, None
         if self.navigator_deg_m is None:
             return ""
         return self._laid(place)
@@ -65,30 +65,30 @@ class Origin:
         self._fix = place
         if self.navigator_deg_m is not None:
             return ""
-        known = self._told is not None and can_be(self._told, place)
-        far = self._told is not None and math.dist(local_position_m(self._told, place), (0.0, 0.0, 0.0)) > FAR_M
+        known = self._received is not None and can_be(self._received, place)
+        far = self._received is not None and math.dist(local_position_m(self._received, place), (0.0, 0.0, 0.0)) > FAR_M
         if known and here_ned_m is None and not far:
-            self.navigator_deg_m = self._told
+            self.navigator_deg_m = self._received
             return ""
         self.navigator_deg_m = place if here_ned_m is None else _behind(place, here_ned_m)
-        if self._told is None:
+        if self._received is None:
             return ""
         if known and not far:
-            return self._laid(self._told)
-        self.doubted, self._told = self._told if known else None, None
+            return self._laid(self._received)
+        self.doubted, self._received = self._received if known else None, None
         self.refused += not known
         return "doubted" if known else "refused"
 
     def _is_doubtful(self, place: Geodetic, *, settled: bool) -> bool:
         """Whether another witness has to confirm the origin before it is used."""
-        used = self._told or self.navigator_deg_m
+        used = self._received or self.navigator_deg_m
         if self.navigator_deg_m is None or used is None:
             return False
         return math.dist(local_position_m(place, used), (0.0, 0.0, 0.0)) > (STEP_M if settled else FAR_M)
 
     def stands(self, pos_ned_m: Vector) -> str:
         """Where the autopilot is about its own origin, by itself: "" where it decides nothing, `moved` or `refused`."""
-        used, fix = self._told or self.navigator_deg_m, self._fix
+        used, fix = self._received or self.navigator_deg_m, self._fix
         if self.doubted is None or used is None or fix is None:
             return ""
         new_m, old_m = (math.dist(local_position_m(fix, origin), pos_ned_m) for origin in (self.doubted, used))
@@ -101,7 +101,7 @@ class Origin:
         if not believed:
             self.refused += 1
             return "refused"
-        self._told = place
+        self._received = place
         return self._laid(place)
 
     def as_facts(self) -> dict[str, Any]:
@@ -109,11 +109,11 @@ class Origin:
         facts = {"offset_ned_m": list(self.offset_ned_m), "moves": self.moves, "refused": self.refused}
         return facts | {"doubted": list(self.doubted) if self.doubted else None}
 
-    def _laid(self, told: Geodetic) -> str:
+    def _laid(self, stated: Geodetic) -> str:
         """North and east of the earth's shape, down the difference of altitudes, as autopilots reckon."""
         assert self.navigator_deg_m is not None
-        north_m, east_m, _ = local_position_m(self.navigator_deg_m, told)
-        offset_ned_m = north_m, east_m, told[2] - self.navigator_deg_m[2]
+        north_m, east_m, _ = local_position_m(self.navigator_deg_m, stated)
+        offset_ned_m = north_m, east_m, stated[2] - self.navigator_deg_m[2]
         if math.dist(offset_ned_m, self.offset_ned_m) < LEAST_MOVE_M:
             return ""
         self.offset_ned_m = offset_ned_m

@@ -178,7 +178,7 @@ class Rates:
         """The least time from one estimate to the next."""
         return 1.0 / self.plan.estimate_hz
 
-    def heard(self, size: int, now_s: float, *, settled: bool = True) -> bool:
+    def received(self, size: int, now_s: float, *, settled: bool = True) -> bool:
         """Note bytes that arrived. True where the line has been overfull: the streams are to be asked for anew, lower.
 
         settled: the vehicle has been asked for all planned streams; before, arriving bytes do not test the plan.

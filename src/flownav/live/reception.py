@@ -110,7 +110,7 @@ class Reception:
             if self._check is not None and not self._check.accepts(content):
                 continue
             who = frame.system, frame.component
-            self._autopilots.told(who, frame.message_id)
+            self._autopilots.received(who, frame.message_id)
             if self.vehicle is not None and who != self.vehicle[:2] and self._accepts(frame.message_id, who):
                 beside = self._decoded(content)
                 if beside is not None:
@@ -159,13 +159,13 @@ class Reception:
             if self.vehicle is None or who == self.vehicle[:2] or not wanted:
                 continue
             if self._check is None or self._check.accepts(content):
-                self._autopilots.told(who, frame.message_id)
+                self._autopilots.received(who, frame.message_id)
                 self._note_other(frame.message_id, content, who)
 
     @property
     def known(self) -> bool:
         """Whether the vehicle is an autopilot by its number, and of a make whose streams we know."""
-        found = self._autopilots.heard.get(self.vehicle[:2]) if self.vehicle is not None else None
+        found = self._autopilots.candidates.get(self.vehicle[:2]) if self.vehicle is not None else None
         return found is not None and found.standing == KNOWN
 
     def better(self, now_s: float) -> Vehicle | None:

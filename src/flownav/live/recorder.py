@@ -23,8 +23,8 @@ from flownav.live.options import Options
 from flownav.live.recovery import WIDTHS, recovered
 from flownav.live.writing import Writer, claim
 from flownav.logs.mavlink.messages import TrueState
+from flownav.navigation.kernel_settings import Equipment
 from flownav.navigation.tables import fed_rows
-from flownav.navigation.told import Equipment
 
 MOST_NOTES = 100_000  # chosen, so that memory has a bound
 FACTS_S = 1.0  # chosen: a killed session loses its last second
@@ -123,7 +123,7 @@ class Recorder(Keeper):
         """The session's own figures so far."""
         self._writer.say("facts", json.loads(json.dumps(facts, default=str)))  # they change while the thread writes
 
-    def finish(self, facts: dict[str, Any], *, heard: bool = True) -> Finished:
+    def finish(self, facts: dict[str, Any], *, received: bool = True) -> Finished:
         """Make the record, whole, and then remove the journal. `facts`: the session's own figures.
 
         heard: a vehicle was received; without one there is nothing to keep, and no record is made.
@@ -136,7 +136,7 @@ class Recorder(Keeper):
         if self._writer.is_stuck:
             return Finished(None, self.journal, reason)
         try:
-            if not heard:
+            if not received:
                 self._remove_journal()
                 return Finished(None, None, "")
             path = self.path if self._force else free_name(self.path)
@@ -168,16 +168,16 @@ class Recorder(Keeper):
         self.journal.unlink(missing_ok=True)
 
 
-def told_every_second(recorder: Recorder, facts: Callable[[], dict[str, Any]]) -> Callable[[float], None]:
+def facts_every_second(recorder: Recorder, facts: Callable[[], dict[str, Any]]) -> Callable[[float], None]:
     """A function called by the loop with our clock: writes the facts once a second, in case the session is killed."""
     at_s = [float("-inf")]
 
-    def tell(now_s: float) -> None:
+    def keep_facts(now_s: float) -> None:
         if now_s - at_s[0] >= FACTS_S:
             at_s[0] = now_s
             recorder.facts(facts())
 
-    return tell
+    return keep_facts
 
 
 def forced_to_disk(path: Path) -> None:

@@ -111,22 +111,22 @@ def _read(journal: Path) -> tuple[list[Block], list[Damage]]:
         raise InputError(f"{journal}: cannot be read ({error.strerror}); see that it is there") from error
     found = list(blocks(data))
     whole = [part for part in found if isinstance(part, Block)]
-    if not any("head" in part.said for part in whole):
+    if not any("head" in part.stated for part in whole):
         raise InputError(f"{journal}: no whole block holds the settings of its navigator; nothing can be made of it")
     return whole, [part for part in found if isinstance(part, Damage)]
 
 
 def _story(whole: list[Block], journal: Path) -> _Story:
-    head = next(part.said["head"] for part in whole if "head" in part.said)
+    head = next(part.stated["head"] for part in whole if "head" in part.stated)
     if head["journal"] != 1 or head["columns"] != WIDTHS:
         version = dict(head["provenance"]).get("flownav")
         raise InputError(f"{journal}: of another flownav ({version}); recover it with that one")
 
     def listed(name: str) -> list[Any]:
-        return [one for part in whole for one in part.said.get(name, [])]
+        return [one for part in whole for one in part.stated.get(name, [])]
 
-    facts = [part.said["facts"] for part in whole if "facts" in part.said]
-    ends = [part.said["end"] for part in whole if "end" in part.said]
+    facts = [part.stated["facts"] for part in whole if "facts" in part.stated]
+    ends = [part.stated["end"] for part in whole if "end" in part.stated]
     return _Story(
         head,
         {int(number): dict(equipment) for number, equipment in listed("segments")},
@@ -216,12 +216,12 @@ def _truth(rows: Array, origins: Array) -> Table:
 
     from flownav.core.frames import rotation_from_quaternion, to_body
 
-    said: TruthRow[Array] = columns_of(TruthRow, rows)
+    truth_rows: TruthRow[Array] = columns_of(TruthRow, rows)
     origin: OriginRow[Array] = columns_of(OriginRow, origins)
-    since = np.searchsorted(np.nan_to_num(origin.since_s, nan=-np.inf), said.t_s, side="right")
+    since = np.searchsorted(np.nan_to_num(origin.since_s, nan=-np.inf), truth_rows.t_s, side="right")
     place = origin.place_deg_m[np.maximum(since - 1, 0)]
-    position = pymap3d.geodetic2ned(*said.place_deg_m.T, *place.T)
-    body = to_body(rotation_from_quaternion(*said.quaternion.T), *said.vel_ned_m_s.T)
+    position = pymap3d.geodetic2ned(*truth_rows.place_deg_m.T, *place.T)
+    body = to_body(rotation_from_quaternion(*truth_rows.quaternion.T), *truth_rows.vel_ned_m_s.T)
     names = (*STATE, *RATES)
-    columns = (*position, *body, *said.quaternion.T, *said.rate_frd_rad_s.T)
-    return {"t_s": said.t_s, **dict(zip(names, map(np.asarray, columns), strict=True))}
+    columns = (*position, *body, *truth_rows.quaternion.T, *truth_rows.rate_frd_rad_s.T)
+    return {"t_s": truth_rows.t_s, **dict(zip(names, map(np.asarray, columns), strict=True))}

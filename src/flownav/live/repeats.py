@@ -34,7 +34,7 @@ LONGEST_S = 0.25  # a slower sensor's copies are all taken, or one that stands s
 NAN = float("nan")
 
 
-class _Told(NamedTuple):
+class _Content(NamedTuple):
     """A source's last content, since when, when it was last taken, and the times between contents [s]."""
 
     content: tuple[float, ...]
@@ -47,7 +47,7 @@ class Repeats:
     """Finds messages that repeat the last content of their source."""
 
     def __init__(self) -> None:
-        self._told: dict[Source, _Told] = {}
+        self._contents: dict[Source, _Content] = {}
         self._sampled_s: dict[Source, float] = {}  # when an inertial source was taken last
 
     def is_crowded(self, source: Source, t_s: float) -> bool:
@@ -64,25 +64,25 @@ class Repeats:
             return False
         names = CONTENT[message.msgname][1]
         content = tuple(getattr(message, name) for name in names)
-        before = self._told.get(source)
+        before = self._contents.get(source)
         if before is None or t_s < before.since_s:
-            self._told[source] = _Told(content, t_s, t_s, deque(maxlen=KEPT))
+            self._contents[source] = _Content(content, t_s, t_s, deque(maxlen=KEPT))
             return False
         if content != before.content:
             before.steps_s.append(t_s - before.since_s)
-            self._told[source] = _Told(content, t_s, t_s, before.steps_s)
+            self._contents[source] = _Content(content, t_s, t_s, before.steps_s)
             return False
         if message.msgname == "GPS_RAW_INT" and message.time_usec:
             return True  # it has the time of its measuring
         if t_s - before.taken_s < EARLY * self.usual_s(source):
             return True
-        self._told[source] = before._replace(taken_s=t_s)
+        self._contents[source] = before._replace(taken_s=t_s)
         return False
 
     def usual_s(self, source: Source) -> float:
         """The time from one content of a source to the next [s]; 0 where it is not known, or longer than LONGEST_S."""
-        told = self._told.get(source)
-        if told is None or len(told.steps_s) < LEAST_KEPT:
+        content_known = self._contents.get(source)
+        if content_known is None or len(content_known.steps_s) < LEAST_KEPT:
             return 0.0
-        usual_s = median_high(told.steps_s)
+        usual_s = median_high(content_known.steps_s)
         return usual_s if usual_s <= LONGEST_S else 0.0

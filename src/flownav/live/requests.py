@@ -48,7 +48,7 @@ class Simulator:
         self._tries = 0
         self._asked_s = float("-inf")
 
-    def heard(self, message: Message, vehicle: Vehicle) -> Truth | None:
+    def received(self, message: Message, vehicle: Vehicle) -> Truth | None:
         """The truth to ask for, where this message of the autopilot is the first sign of a simulator."""
         if self.truth is not None:
             return None
@@ -77,7 +77,7 @@ class _Stream(NamedTuple):
     number: int
     rate_hz: float
     asked_s: float
-    heard_s: float
+    received_s: float
     wait_s: float
 
 
@@ -115,8 +115,8 @@ class Requests:
             before = self._streams.get(name)
             if name in self.refused or (before is not None and before.rate_hz == rate_hz):
                 continue
-            heard_s = before.heard_s if before is not None else float("-inf")
-            self._streams[name] = _Stream(number, rate_hz, now_s, heard_s, SILENT_S)
+            received_s = before.received_s if before is not None else float("-inf")
+            self._streams[name] = _Stream(number, rate_hz, now_s, received_s, SILENT_S)
             if name not in self._left[bool(self._tries) :]:  # one that is under way was asked for at the old rate
                 self._left.insert(bool(self._tries), name)  # what is asked for now is needed now
 
@@ -125,13 +125,13 @@ class Requests:
         """Whether everything was asked for."""
         return not self._left
 
-    def heard(self, name: str, now_s: float) -> None:
+    def received(self, name: str, now_s: float) -> None:
         """A message of the vehicle."""
         self._spoke_s = now_s
         stream = self._streams.get(name)
         if stream is not None:
             wait_s = max(SILENT_S, SILENT_PERIODS / stream.rate_hz) if stream.rate_hz else float("inf")
-            self._streams[name] = stream._replace(heard_s=now_s, wait_s=wait_s)
+            self._streams[name] = stream._replace(received_s=now_s, wait_s=wait_s)
 
     def due(self, mav: Any, vehicle: Vehicle, now_s: float) -> Message | None:
         """The command to send now, if any."""
@@ -159,7 +159,7 @@ class Requests:
             name
             for name, stream in self._streams.items()
             if (name not in self.refused or name == ORIGIN)
-            and now_s - max(stream.asked_s, stream.heard_s) > stream.wait_s
+            and now_s - max(stream.asked_s, stream.received_s) > stream.wait_s
         ]
         for name in found:
             wait_s = min(2.0 * self._streams[name].wait_s, MOST_PATIENCE_S)

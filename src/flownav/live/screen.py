@@ -65,7 +65,7 @@ def traffic_facts(
         "too_slow_for": plan.lacks,
         "estimate_hz_at_most": plan.estimate_hz if plan.estimate_hz < float("inf") else None,
         "estimates_replaced": link.counts["replaced"],
-        "flow_without_own_estimate": session.hearing.flow_waited,
+        "flow_without_own_estimate": session.intake.flow_waited,
         "frames_not_sent": link.counts["not_sent"],
         "datagrams_lost": link.counts["overflowed"],
         "slow_reader": session.backlog.spells if session.backlog is not None else 0,
@@ -79,16 +79,16 @@ def in_words(facts: Mapping[str, Any]) -> str:
         return f"{bytes_s / 1e3:.1f} kB/s" + ("" if share is None else f" ({100.0 * share:.0f} %)")
 
     received, written = (one(facts[f"{way}_bytes_s"], facts[f"{way}_share"]) for way in ("received", "written"))
-    said = [f"Link: in {received}, out {written}"]
+    parts = [f"Link: in {received}, out {written}"]
     at_most = facts["estimate_hz_at_most"]
-    said += [f"at most {at_most:.0f} estimates/s"] if at_most is not None else []
-    said += [f"TOO SLOW for {facts['too_slow_for']}"] if facts["too_slow_for"] else []
+    parts += [f"at most {at_most:.0f} estimates/s"] if at_most is not None else []
+    parts += [f"TOO SLOW for {facts['too_slow_for']}"] if facts["too_slow_for"] else []
     replaced, not_sent = facts["estimates_replaced"], facts["frames_not_sent"]
-    said += [f"not sent: {replaced} old estimates, {not_sent} other frames"] if replaced or not_sent else []
+    parts += [f"not sent: {replaced} old estimates, {not_sent} other frames"] if replaced or not_sent else []
     lost = facts["datagrams_lost"]
-    said += [f"LOST {lost} datagrams: more came than could be read"] if lost else []
-    said += ["the reader is SLOW, and was sent fewer estimates"] if facts["slow_reader"] else []
-    return "; ".join(said)
+    parts += [f"LOST {lost} datagrams: more came than could be read"] if lost else []
+    parts += ["the reader is SLOW, and was sent fewer estimates"] if facts["slow_reader"] else []
+    return "; ".join(parts)
 
 
 class Screen:
@@ -120,7 +120,7 @@ class Screen:
         return View(
             self._title(),
             self._alarms(),
-            [self._sensor(sensor, now_s) for sensor in sorted(session.hearing.readings)],
+            [self._sensor(sensor, now_s) for sensor in sorted(session.intake.readings)],
             self._estimate(),
             [(name, strip(values), _figure(values[-1])) for name, values in self._strips.items()],
             [self._protection(), f"dropped: {dropped}", self._line(now_s), self._footing(), self._running()],
@@ -128,13 +128,13 @@ class Screen:
 
     def _sensor(self, sensor: Sensor, now_s: float) -> tuple[str, ...]:
         session = self._session
-        keys = [key for key in sorted(session.innovations) if key[0] == sensor and told(session, key)]
+        keys = [key for key in sorted(session.innovations) if key[0] == sensor and is_shown(session, key)]
         found = [session.innovations[key] for key in keys]
         return (
             sensor.name.lower(),
             f"{self._rates.get(sensor, 0.0):.0f}",
-            f"{now_s - session.hearing.heard_s[sensor]:.2f}",
-            f"{session.hearing.lags.by_sensor.get(sensor, 0.0):.2f}",
+            f"{now_s - session.intake.received_s[sensor]:.2f}",
+            f"{session.intake.lags.by_sensor.get(sensor, 0.0):.2f}",
             " ".join(_figure(innovation) for innovation, _, _ in found),
             " ".join(_figure(ratio) for _, ratio, _ in found),
             " ".join(dict.fromkeys(Reason(reason).label for _, _, reason in found if reason)),
@@ -201,29 +201,29 @@ class Screen:
         withheld = ", ".join(f"{name} {count}" for name, count in sorted(session.withheld.items()))
         refused = ", ".join(session.requests.refused)
         return (
-            f"horizon {session.hearing.horizon_s:.2f} s; sent {session.sent}; "
+            f"horizon {session.intake.horizon_s:.2f} s; sent {session.sent}; "
             f"withheld: {withheld or 'none'}; resets {session.resets}; "
             f"latency p50 {p50:.2f} ms, p99 {p99:.2f} ms" + (f"; vehicle refuses {refused}" if refused else "")
         )
 
     def _follow(self, now_s: float) -> None:
         session, elapsed_s = self._session, now_s - self._at_s
-        for sensor, count in session.hearing.readings.items():
+        for sensor, count in session.intake.readings.items():
             if elapsed_s > 0.0:
                 self._rates[sensor] = (count - self._before.get(sensor, 0)) / elapsed_s
             self._before[sensor] = count
         self._at_s = now_s
         for sensor, places in SHOWN.items():
-            reading = session.hearing.latest.get(sensor)
+            reading = session.intake.latest.get(sensor)
             for place in places if reading else ():
                 values = self._strips.setdefault(COLUMNS[sensor][place], deque(maxlen=STRIP))
                 values.append(reading.value[place] if reading else float("nan"))
 
 
-def told(session: Session, key: tuple[int, int]) -> bool:
+def is_shown(session: Session, key: tuple[int, int]) -> bool:
     """Whether the newest reading of a sensor has the component: GPS over MAVLink has no vertical velocity to judge."""
     sensor, component = Sensor(key[0]), key[1]
-    reading = session.hearing.latest.get(sensor)
+    reading = session.intake.latest.get(sensor)
     return reading is None or component not in OPTIONAL.get(sensor, ()) or math.isfinite(reading.value[component])
 
 

@@ -12,8 +12,8 @@ from flownav.live.anchor import PLACES
 from flownav.live.answers import WITHHELD, Answers
 from flownav.live.backlog import Backlog
 from flownav.live.filtering import BATCH_READINGS, Filtering, Keeper
-from flownav.live.hearing import Hearing
 from flownav.live.horizon import Refused
+from flownav.live.intake import Intake
 from flownav.live.offering import Offering
 from flownav.live.options import Options
 from flownav.live.rates import Rates
@@ -46,13 +46,13 @@ class Session:
         self.reception = Reception(
             options.system, options.component, options.key, unix_s, options.accept, ODOMETRY_COMPONENT
         )
-        self._others_said = 0
+        self._others_counted = 0
         self.backlog = Backlog() if options.capacity_bytes_s is None else None  # a line of a known pace is kept to it
         self.rates = Rates(options.capacity_bytes_s, options.send, signed=options.key is not None)
         self.answers, self.requests, self.simulator = Answers(options), Requests(self.rates), Simulator()
         self.filtering = Filtering(options, keeper)
-        self.hearing = Hearing(options, self.filtering.rings)
-        self.offering = Offering(options.limits, keeper, self.hearing, self.filtering)
+        self.intake = Intake(options, self.filtering.rings)
+        self.offering = Offering(options.limits, keeper, self.intake, self.filtering)
         self.clock: VehicleClock | None = None
         self.withheld: Counter[str] = Counter()
         self.sent = self.velocities = self.turns = 0
@@ -70,12 +70,12 @@ class Session:
         """Everything that was dropped, by where and why."""
         found = {f"link: {name}": n for name, n in self.reception.counts.items()}
         found |= {f"clock: {name}": n for name, n in (self.clock.counts if self.clock else Counter[str]()).items()}
-        return found | dict(self.hearing.dropped)
+        return found | dict(self.intake.dropped)
 
     @property
     def origin_deg_m(self) -> tuple[float, float, float] | None:
         """Origin of the navigator's frame."""
-        return self.hearing.origin.navigator_deg_m
+        return self.intake.origin.navigator_deg_m
 
     @property
     def alarms(self) -> dict[Sensor, Refused]:
@@ -85,12 +85,12 @@ class Session:
     @property
     def resets(self) -> int:
         """Jumps of what is sent: starts, resets of the filter, and a new origin of the autopilot."""
-        return self.filtering.jumps + self.hearing.origin.moves + self.offering.anchor.moves
+        return self.filtering.jumps + self.intake.origin.moves + self.offering.anchor.moves
 
     @property
     def due(self) -> bool:
         """Whether flow has come, for which an estimate is to be sent."""
-        return self.hearing.flow_came
+        return self.intake.flow_arrived
 
     # -- what arrives -----------------------------------------------------------------------------------------
     def take(self, piece: bytes, now_s: float, *, whole: bool) -> bool:
@@ -107,12 +107,12 @@ class Session:
                     self.requests.begin(vehicle, now_s)
                     self._restart(self.clock.now_s(now_s), "silence", now_s - self._vehicle_s)
                 self._vehicle_s = now_s
-                self.requests.heard(message.msgname, now_s)
-                self._told(message, self.clock, vehicle, now_s)
+                self.requests.received(message.msgname, now_s)
+                self._received(message, self.clock, vehicle, now_s)
             if message.msgname in CONVERTERS:
                 self._measured(message, self.clock, vehicle, now_s)
         self._say_others(now_s)
-        overfull = self.rates.heard(len(piece), now_s, settled=self.requests.settled)
+        overfull = self.rates.received(len(piece), now_s, settled=self.requests.settled)
         if overfull and self.reception.vehicle is not None and self.clock is not None:
             self.requests.revise(self.reception.vehicle, now_s)
             t_s = self.clock.now_s(now_s)
@@ -122,8 +122,8 @@ class Session:
     def _say_others(self, now_s: float) -> None:
         """Other autopilots go into the record, each once."""
         others = self.reception.others
-        if len(others) > self._others_said and self.clock is not None:
-            self._others_said = len(others)
+        if len(others) > self._others_counted and self.clock is not None:
+            self._others_counted = len(others)
             names = ", ".join(f"{system}.{component}" for system, component in others)
             self.keeper.note(self.clock.now_s(now_s), "link", "other_autopilot", names, NAN)
 
@@ -138,8 +138,8 @@ class Session:
         if better is None or before is None or self.clock is None:
             return
         names = [f"{one.system}.{one.component}" for one in (better, before)]
-        said = f"{names[0]} is taken for the autopilot, in place of {names[1]}"
-        self._restart(self.clock.now_s(now_s), said, NAN)
+        why_restarted = f"{names[0]} is taken for the autopilot, in place of {names[1]}"
+        self._restart(self.clock.now_s(now_s), why_restarted, NAN)
         self.reception.take(better)
         self._vehicle_s = NAN
         self.turns += 1
@@ -153,15 +153,15 @@ class Session:
 
     def _restart(self, t_s: float, why: str, value: float) -> None:
         """The vehicle may be elsewhere now: the navigation begins anew."""
-        self.hearing.begin_anew()
+        self.intake.begin_anew()
         self.filtering.stop()
         self.offering.begin_anew()
         self.keeper.note(t_s, "link", "restart", why, value)
 
-    def _told(self, message: Message, clock: VehicleClock, vehicle: Vehicle, now_s: float) -> None:
+    def _received(self, message: Message, clock: VehicleClock, vehicle: Vehicle, now_s: float) -> None:
         """Take messages of the autopilot that are no measurements."""
         name = message.msgname
-        truth = self.simulator.heard(message, vehicle)
+        truth = self.simulator.received(message, vehicle)
         if truth is not None:
             self.requests.revise(vehicle, now_s, {truth.name: (truth.number, truth.rate_hz)})
         if name == "TIMESYNC":
@@ -171,14 +171,14 @@ class Session:
         elif name == "COMMAND_ACK":
             self.requests.acknowledged(message)
         elif name == "SYSTEM_TIME":
-            clock.told_unix(message, vehicle.system, vehicle.component)
+            clock.received_unix(message, vehicle.system, vehicle.component)
         elif name == "GPS_GLOBAL_ORIGIN":
-            self._origin_told(message, clock.now_s(now_s))
+            self._origin_received(message, clock.now_s(now_s))
         elif name == LOCAL_POSITION:
-            said = STATES[name](message)
-            if isinstance(said, LocalState):
-                self.offering.beginning.state_height(-said.pos_ned_m[2], clock.now_s(now_s))
-                self.offering.say_origin(self.hearing.origin.stands(said.pos_ned_m), clock.now_s(now_s))
+            state_message = STATES[name](message)
+            if isinstance(state_message, LocalState):
+                self.offering.beginning.state_height(-state_message.pos_ned_m[2], clock.now_s(now_s))
+                self.offering.say_origin(self.intake.origin.stands(state_message.pos_ned_m), clock.now_s(now_s))
         elif name in TRUTHS:
             state, t_s = STATES[name](message), clock.now_s(now_s)
             if isinstance(state, TrueState) and t_s == t_s:
@@ -195,11 +195,11 @@ class Session:
             self.requests.begin(vehicle, now_s)  # a reboot: all streams are off
             self.keeper.note(t_s, "link", "timesync_step", "the vehicle began anew; its streams are asked for again")
 
-    def _origin_told(self, message: Message, t_s: float) -> None:
-        origin = self.hearing.origin
+    def _origin_received(self, message: Message, t_s: float) -> None:
+        origin = self.intake.origin
         place = message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3
         nowhere = origin.about_deg_m is None
-        event = origin.told(place, settled=self.offering.settled)
+        event = origin.received(place, settled=self.offering.settled)
         if nowhere and not event and self.filtering.lacks_gps and not self.armed:
             self.filtering.stop()  # which way is north is known now; one that flies goes on as it is
             self.keeper.note(t_s, "link", "restart", "origin_came", NAN)
@@ -207,9 +207,9 @@ class Session:
 
     def _measured(self, message: Message, clock: VehicleClock, vehicle: Vehicle, now_s: float) -> None:
         here_ned_m = self.filtering.here_ned_m if self.origin_deg_m is None else None
-        event = self.hearing.take(message, clock, vehicle, self._pose(), now_s, here_ned_m)
-        while self.hearing.swaps:
-            since_s, source, why = self.hearing.swaps.popleft()
+        event = self.intake.take(message, clock, vehicle, self._pose(), now_s, here_ned_m)
+        while self.intake.swaps:
+            since_s, source, why = self.intake.swaps.popleft()
             self.keeper.note(since_s, "imu", why, f"{source.message} is not believed any more", NAN)
         if event == "clock_jump":
             self._restart(clock.now_s(now_s), event, NAN)
@@ -221,7 +221,7 @@ class Session:
     # -- the time passes --------------------------------------------------------------------------------------
     def tick(self, now_s: float) -> None:
         """Feed what is due, and send what is due: estimates, requests, heartbeats."""
-        hearing = self.hearing
+        intake = self.intake
         if not self.offering.settled:
             self._choose(now_s)
         if self.clock is None or self.reception.vehicle is None:
@@ -232,20 +232,20 @@ class Session:
         if self.origin_deg_m is not None and self.origin_deg_m != self._origin_kept:
             self._origin_kept = self.origin_deg_m
             self.keeper.origin(t_s, self.origin_deg_m)
-        listened = t_s - hearing.since_s >= self.options.listen_s
-        if self.filtering.running is None and listened and len(hearing.rings):
-            self.filtering.begin(hearing.gps_heard, hearing.origin.about_deg_m)
-        if self.filtering.lacks_imu and self.filtering.imu_rate_hz(hearing.newest_s) >= SLOWEST_IMU_HZ:
+        listened = t_s - intake.since_s >= self.options.listen_s
+        if self.filtering.running is None and listened and len(intake.rings):
+            self.filtering.begin(intake.gps_received, intake.origin.about_deg_m)
+        if self.filtering.lacks_imu and self.filtering.imu_rate_hz(intake.newest_s) >= SLOWEST_IMU_HZ:
             self._restart(t_s, "imu_came", NAN)  # it was decided without one, which serves now
-        elif self.filtering.lacks_gps and hearing.gps_heard and not self.armed:
+        elif self.filtering.lacks_gps and intake.gps_received and not self.armed:
             self.filtering.stop()  # and is begun with GPS at once; one that flies goes on as it is
             self.keeper.note(t_s, "link", "restart", "gps_came", NAN)
-        until_s = min(t_s, hearing.lags.newest_s) - hearing.horizon_s
+        until_s = min(t_s, intake.lags.newest_s) - intake.horizon_s
         behind = self.filtering.running is not None and self._feed(until_s)
         since_s = now_s - self._sent_s
         behind = behind or not self._is_read(t_s, now_s)
         if not behind and (self.due or since_s >= SEND_EVERY_S) and since_s >= self.rates.estimate_every_s:
-            hearing.flow_came, self._sent_s = False, now_s
+            intake.flow_arrived, self._sent_s = False, now_s
             self._offer(t_s, now_s)
         if now_s - self._second_s >= SECOND_S:
             self._second_s = now_s
@@ -262,9 +262,9 @@ class Session:
         if outcome.readings:
             offered = [InnovationRow(*row) for row in outcome.innovation.tolist()]
             for row in offered:
-                told = row.innovation, row.test_ratio, int(row.reason)
-                self.innovations[int(row.sensor), int(row.component)] = told
-            self.hearing.serving.judged(offered)
+                offer = row.innovation, row.test_ratio, int(row.reason)
+                self.innovations[int(row.sensor), int(row.component)] = offer
+            self.intake.serving.judged(offered)
             self.offering.heights.judged(offered)
         return outcome.readings == BATCH_READINGS
 

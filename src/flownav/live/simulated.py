@@ -63,7 +63,7 @@ class SimulatedVehicle:
         self._velocity = np.column_stack([truth[name] for name in VELOCITY_BODY])
         self._quaternion = np.column_stack([truth[name] for name in QUATERNION])
         self.end_s = float(self._truth_s[-1])
-        self._imu_told_s = float("-inf")
+        self._imu_sent_s = float("-inf")
         self._origin_deg_m = log.origin_deg_m or ORIGIN_DEG_M
         self._due: list[Due] = self._schedule()
 
@@ -165,10 +165,10 @@ class SimulatedVehicle:
             if stream is None or not len(stream):
                 return None
             row = _newest(stream, due.t_s)
-            return tuple(map(float, stream.value[row])) if self._imu_told_s < stream.t_s[row] <= due.t_s else None
+            return tuple(map(float, stream.value[row])) if self._imu_sent_s < stream.t_s[row] <= due.t_s else None
 
         field, altitude = news(Sensor.MAG), news(Sensor.BARO)
-        self._imu_told_s = due.t_s
+        self._imu_sent_s = due.t_s
         return say.highres_imu(
             self.mav, time_us, self._reading(Sensor.IMU, due.row),
             mag_gauss=None if field is None else (field[0], field[1], field[2]),

@@ -46,8 +46,8 @@ class VehicleClock:
         self._leads: deque[tuple[float, float]] = deque(maxlen=2)  # since when, and session time less ours [s]
         self._exchanges: deque[Exchange] = deque(maxlen=EXCHANGES_KEPT)
         self._leaping, self._leap_s = 0, NAN  # stamps in a row that are ahead of our clock, and by how much
-        self._told_s = self._doubted_s = NAN  # offset by TIMESYNC, and one that differs by a step
-        self._said_s = self._ahead_s = NAN  # our clock when the time was asked for last, and session time less ours
+        self._offset_stated_s = self._doubted_s = NAN  # offset by TIMESYNC, and one that differs by a step
+        self._asked_s = self._ahead_s = NAN  # our clock when the time was asked for last, and session time less ours
         self.counts: Counter[str] = Counter()
 
     def stamped(self, message: Message, system: int, component: int, now_s: float) -> stamps.Aligned:
@@ -91,11 +91,11 @@ class VehicleClock:
         """Session time less ours, by the least wait seen; NaN before the first stamp."""
         return max((lead_s for _, lead_s in self._leads), default=NAN)
 
-    def told_unix(self, message: Message, system: int, component: int) -> None:
+    def received_unix(self, message: Message, system: int, component: int) -> None:
         """SYSTEM_TIME."""
         if message.time_boot_ms:
             clock = (system, component, "unix")
-            self._state = stamps.told_unix_time(
+            self._state = stamps.received_unix_time(
                 self._state, clock, message.time_unix_usec * 1e-6, message.time_boot_ms * 1e-3
             )
 
@@ -116,13 +116,13 @@ class VehicleClock:
 
     def _stepped(self, offset_s: float) -> bool:
         """Whether two exchanges in a row agree on an offset that is more than STEP_S from the one in use."""
-        if not abs(offset_s - self._told_s) > STEP_S:
-            self._told_s, self._doubted_s = offset_s, NAN
+        if not abs(offset_s - self._offset_stated_s) > STEP_S:
+            self._offset_stated_s, self._doubted_s = offset_s, NAN
             return False
         if not abs(offset_s - self._doubted_s) <= STEP_S:
             self._doubted_s = offset_s
             return False
-        self._told_s, self._doubted_s = offset_s, NAN
+        self._offset_stated_s, self._doubted_s = offset_s, NAN
         return True
 
     def _serves(self, exchange: Exchange) -> bool:
@@ -151,8 +151,8 @@ class VehicleClock:
         best = self.best(now_s)
         ahead_s = self._offset_s if best is None else max(best.offset_s + self._shift_s, self._offset_s)
         if 0.0 < self._ahead_s - ahead_s <= MOST_SLEWED_S:
-            ahead_s = max(ahead_s, self._ahead_s - SLEW * max(now_s - self._said_s, 0.0))
-        self._said_s, self._ahead_s = now_s, ahead_s
+            ahead_s = max(ahead_s, self._ahead_s - SLEW * max(now_s - self._asked_s, 0.0))
+        self._asked_s, self._ahead_s = now_s, ahead_s
         return now_s + ahead_s
 
     def boot_s(self, t_s: float) -> float:

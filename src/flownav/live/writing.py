@@ -127,7 +127,7 @@ class Writer:
         self.reason = ""
         self.written = 0  # bytes
         self._file, self._head, self._failed = file, head, failed
-        self._said: deque[tuple[str, Any]] = deque()
+        self._queued: deque[tuple[str, Any]] = deque()
         self._rows: deque[Rows] = deque()
         self._taken, self._done = 0, 0  # bytes of rows; each is counted up by one thread only
         self._number = 0
@@ -141,7 +141,7 @@ class Writer:
     def say(self, name: str, value: Any) -> None:
         """One of the lists of a block (`segments`, `origins`, `notes`) has one more, or `facts` are these now."""
         if not self.reason:
-            self._said.append((name, value))
+            self._queued.append((name, value))
 
     def take(self, rows: Rows) -> None:
         """Rows that belong together: they stand in one block or are lost together."""
@@ -192,22 +192,22 @@ class Writer:
 
     def _write(self) -> None:
         """One block of all that has come."""
-        said: dict[str, Any] = {}
-        for _ in range(len(self._said)):
-            name, value = self._said.popleft()
+        pending: dict[str, Any] = {}
+        for _ in range(len(self._queued)):
+            name, value = self._queued.popleft()
             if name in ("facts", "end"):
-                said[name] = value
+                pending[name] = value
             else:
-                said.setdefault(name, []).append(value)
+                pending.setdefault(name, []).append(value)
         taken = [self._rows.popleft() for _ in range(len(self._rows))]
         names = dict.fromkeys(name for rows in taken for name in rows)
         joined = {name: np.concatenate([rows[name] for rows in taken if name in rows]) for name in names}
-        if said or joined:
-            self._put(said, joined)
+        if pending or joined:
+            self._put(pending, joined)
         self._done += sum(values.nbytes for values in joined.values())
 
-    def _put(self, said: dict[str, Any], rows: Rows) -> None:
-        left = memoryview(block(self._number, said, rows))
+    def _put(self, pending: dict[str, Any], rows: Rows) -> None:
+        left = memoryview(block(self._number, pending, rows))
         self._number += 1
         while left:
             count = os.write(self._file, left)
@@ -217,5 +217,5 @@ class Writer:
     def _stop(self, reason: str) -> None:
         if not self.reason:
             self.reason = reason
-            self._said.clear()
+            self._queued.clear()
             self._rows.clear()

@@ -279,14 +279,14 @@ def streams_of_fixes(
     """
     if not len(fixes):
         return [], None
-    told = [(Sensor.GPS_POSITION, local_position(fixes), position_variance)]
+    wanted_streams = [(Sensor.GPS_POSITION, local_position(fixes), position_variance)]
     if np.isfinite(velocity).any():
-        told.insert(0, (Sensor.GPS_VELOCITY, velocity, velocity_variance))
+        wanted_streams.insert(0, (Sensor.GPS_VELOCITY, velocity, velocity_variance))
     return [
         Stream.of(
             sensor, fixes.t_s, value, variance=possible_variance(variance), delay_s=delay_s, rejected=fixes.rejected
         )
-        for sensor, value, variance in told
+        for sensor, value, variance in wanted_streams
     ], origin_of(fixes)
 
 

@@ -240,11 +240,11 @@ def _range(blocks: Blocks) -> Stream | None:
     if block is None:
         return None
     range_mm = block.columns["range.zrange"]
-    heard = (range_mm > 0.0) & (range_mm < FARTHEST_MM)
+    within = (range_mm > 0.0) & (range_mm < FARTHEST_MM)
     news = readings_once(block.t_s, range_mm[:, None])
-    good = heard & news
+    good = within & news
     return sensor_stream(
-        Sensor.RANGE, block.t_s[good], 1e-3 * range_mm[good], rejected=counted(invalid=~heard, repeated=heard & ~news)
+        Sensor.RANGE, block.t_s[good], 1e-3 * range_mm[good], rejected=counted(invalid=~within, repeated=within & ~news)
     )
 
 

@@ -110,11 +110,11 @@ def _head(path: Path, content: bytes) -> tuple[int, dict[int, _Kind], int]:
             fields: list[tuple[str, Any]] = [("number", np.dtype("<u2")), ("time", TIME_STAMPS[version][0])]
             names = []
             for k in range(variables):
-                spelled, place = _name(content, place)
-                if len(spelled) < 4 or spelled[-3] != "(" or spelled[-1] != ")" or spelled[-2] not in CODES:
-                    raise ValueError(f"variable {spelled!r}")
-                names.append(spelled[:-3])
-                fields.append((f"v{k}", CODES[spelled[-2]]))
+                label, place = _name(content, place)
+                if len(label) < 4 or label[-3] != "(" or label[-1] != ")" or label[-2] not in CODES:
+                    raise ValueError(f"variable {label!r}")
+                names.append(label[:-3])
+                fields.append((f"v{k}", CODES[label[-2]]))
             kinds.setdefault(number, _Kind(name, tuple(names), np.dtype(fields)))
     except (struct.error, ValueError) as error:
         raise InputError(f"{path}: a damaged head ({error}); give another log") from error

@@ -41,10 +41,10 @@ def changes(
             yield Happened(last_s, kind, words(int(value[row])), float(value[row]))
 
 
-def messages(told: Iterable[tuple[float, str]]) -> Iterator[Happened]:
+def messages(texts: Iterable[tuple[float, str]]) -> Iterator[Happened]:
     """Messages by time and text, as far as they are few; a text that is repeated at once stands there once."""
     before, count = "", 0
-    for t_s, text in told:
+    for t_s, text in texts:
         if text and text != before and count < MOST_ROWS:
             before, count = text, count + 1
             yield Happened(t_s, MESSAGE, text, float("nan"))

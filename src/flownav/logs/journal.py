@@ -31,7 +31,7 @@ class Block(NamedTuple):
     """A whole block: its number, its entries, and rows by name, each (n, columns)."""
 
     number: int
-    said: dict[str, Any]
+    stated: dict[str, Any]
     rows: dict[str, Array]
 
 
@@ -43,11 +43,11 @@ class Damage(NamedTuple):
     tail: bool
 
 
-def block(number: int, said: Mapping[str, Any], rows: Mapping[str, Array] | None = None) -> bytes:
+def block(number: int, stated: Mapping[str, Any], rows: Mapping[str, Array] | None = None) -> bytes:
     """A block's bytes. ValueError where it would be too large."""
     found = rows or {}
     shapes = {name: list(values.shape) for name, values in found.items()}
-    text = json.dumps({**said, "rows": shapes}, default=str).encode()
+    text = json.dumps({**stated, "rows": shapes}, default=str).encode()
     payload = b"".join(
         [LENGTH.pack(len(text)), text, *(np.ascontiguousarray(v, DTYPE).tobytes() for v in found.values())]
     )
@@ -95,15 +95,15 @@ def _block_at(data: memoryview, place: int, length: int) -> Block | None:
     try:
         (count,) = LENGTH.unpack(payload[: LENGTH.size])
         at = LENGTH.size + count
-        said = json.loads(bytes(payload[LENGTH.size : at]))
+        stated = json.loads(bytes(payload[LENGTH.size : at]))
         rows = {}
-        for name, (many, width) in said.pop("rows").items():
+        for name, (many, width) in stated.pop("rows").items():
             size = many * width * DTYPE.itemsize
             rows[name] = np.frombuffer(payload[at : at + size], DTYPE).reshape(many, width)
             at += size
     except (struct.error, ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return None
-    return Block(int(number), said, rows)
+    return Block(int(number), stated, rows)
 
 
 def _next_mark(data: memoryview, place: int) -> int:

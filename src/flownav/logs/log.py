@@ -93,19 +93,19 @@ INSTEAD = {
 }
 
 
-def absences_of(streams: Mapping[Sensor, Stream], **said: str) -> Iterator[Absence]:
+def absences_of(streams: Mapping[Sensor, Stream], **phrases: str) -> Iterator[Absence]:
     """The sensors that the streams lack. said: the reader's own text for `Absence.what`, by name of the sensor."""
     for sensor, absence in INSTEAD.items():
         if sensor not in streams:
             alone = sensor == Sensor.ATTITUDE and Sensor.IMU not in streams
             instead = "nothing finds it without an IMU: the log cannot be replayed" if alone else absence.instead
-            yield Absence(said.get(sensor.name.lower(), absence.what), instead)
+            yield Absence(phrases.get(sensor.name.lower(), absence.what), instead)
     flow = streams.get(Sensor.FLOW_RATE)
     if flow is None and Sensor.FLOW_VELOCITY not in streams:
-        yield Absence(said.get("flow_rate", "no optical flow"), "nothing but GPS holds the horizontal velocity")
+        yield Absence(phrases.get("flow_rate", "no optical flow"), "nothing but GPS holds the horizontal velocity")
     if flow is not None and Sensor.RANGE not in streams:
         yield Absence(
-            said.get("range", "no range"),
+            phrases.get("range", "no range"),
             "flow is fused on the height that the other sensors leave, which is uncertain",
         )
     if flow is not None and np.isnan(flow.value[:, 2:]).all():

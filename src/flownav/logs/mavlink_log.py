@@ -16,20 +16,20 @@ from flownav.core.record import RATES, Table
 from flownav.logs.assembly import Origin, content_of, local_ned, near_the_rest, sha256_of
 from flownav.logs.log import SIMULATOR, Log, absences_of, attitude_at, in_order, state_table
 from flownav.logs.mavlink.asked import ASKING, Asked
-from flownav.logs.mavlink.clock import Aligned, ClockState, align, stamp_of, told_unix_time
+from flownav.logs.mavlink.clock import Aligned, ClockState, align, received_unix_time, stamp_of
 from flownav.logs.mavlink.converted import Context, Dropped, Pose
+from flownav.logs.mavlink.events import VehicleEvents
 from flownav.logs.mavlink.framing import ARDUPILOT, INVALID_AUTOPILOT, PX4, Frame, Message, coder, dialect, tlog_frames
 from flownav.logs.mavlink.messages import CONVERTERS, STATES, LocalState, instance_of, measurements
 from flownav.logs.mavlink.position_messages import LEAST_FIX, fix_deg_m
-from flownav.logs.mavlink.said import Said
 from flownav.logs.mavlink.sensor_messages import range_limits_m
 from flownav.logs.mavlink_streams import Gathered, Source
 from flownav.logs.plausible import of_one_clock
 from flownav.logs.references import listed, of_one_origin
 
 AUTOPILOTS = {ARDUPILOT: "ArduPilot", PX4: "PX4"}
-TELLING = ("HEARTBEAT", "STATUSTEXT", "PARAM_VALUE")
-WANTED = {*CONVERTERS, *STATES, "SYSTEM_TIME", *TELLING, *ASKING}
+EVENT_MESSAGES = ("HEARTBEAT", "STATUSTEXT", "PARAM_VALUE")
+WANTED = {*CONVERTERS, *STATES, "SYSTEM_TIME", *EVENT_MESSAGES, *ASKING}
 NOTHING = (
     "no usable reading of any sensor; have the autopilot send ATTITUDE or HIGHRES_IMU at 20 Hz or more, and "
     "GPS_RAW_INT or OPTICAL_FLOW_RAD"
@@ -96,7 +96,7 @@ class Flight:
         self.counts: Counter[str] = Counter()
         self.notes: list[str] = []
         self.limits: dict[str, tuple[float, float]] = {}
-        self.said, self.asked = Said(vehicle.make), Asked(vehicle.make)
+        self.events, self.asked = VehicleEvents(vehicle.make), Asked(vehicle.make)
         self._quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
         self._pose: Pose | None = None
         self._vehicle = vehicle
@@ -126,9 +126,9 @@ class Flight:
         elif name == "SYSTEM_TIME" and own and message.time_boot_ms:
             unix = (frame.system, frame.component, "unix")
             unix_s, boot_s = message.time_unix_usec * 1e-6, message.time_boot_ms * 1e-3
-            self._clock = told_unix_time(self._clock, unix, unix_s, boot_s)
-        elif name in TELLING and own:
-            self.said.take(aligned.t_s, message)
+            self._clock = received_unix_time(self._clock, unix, unix_s, boot_s)
+        elif name in EVENT_MESSAGES and own:
+            self.events.take(aligned.t_s, message)
         elif name in ASKING and own and not aligned.reason:
             self.asked.take(aligned.t_s, message)
 
@@ -162,7 +162,7 @@ class Flight:
     @property
     def parameters(self) -> dict[str, float]:
         """Those that the ground station asked for."""
-        return {name: value for name, value in self.said.parameters.items() if np.isfinite(value)}
+        return {name: value for name, value in self.events.parameters.items() if np.isfinite(value)}
 
     def _flow_limits(self) -> None:
         """PX4's parameters of the flow sensor, where the ground station asked for them."""
@@ -285,7 +285,7 @@ def read_tlog(path: Path, *, flow_instance: int | None = None) -> Log:
         (*choice, *_damage_notes(damage, frames), *_flight_notes(flight), *flight.notes, *chosen, *strays),
         own, vehicle.name, flight.limits,
         tuple(absences_of(streams, **LACKING)), clock_start_s=0.0, truth_name=SIMULATOR,
-        parameters=flight.parameters, happened=flight.said.happened(),
+        parameters=flight.parameters, happened=flight.events.happened(),
         setpoints=flight.asked.setpoints(), battery=flight.asked.battery(),
     )  # fmt: skip
 

@@ -197,11 +197,11 @@ def _check_gps(where: Path, position: Stream, velocity: Stream) -> None:
     edges = np.arange(t_s[0], t_s[-1], GPS_INTERVAL_S)
     flown = mean_over(velocity.t_s[known], velocity.value[known, :2], edges[:-1], edges[1:]) * GPS_INTERVAL_S
     moved = np.diff(np.column_stack([np.interp(edges, t_s, column) for column in position.value[:, :2].T]), axis=0)
-    heard = _gap_at(t_s, edges) <= GPS_INTERVAL_S
-    heard = heard[:-1] & heard[1:]
-    if not heard.any() or np.sqrt(np.mean(flown[heard] ** 2)) < LEAST_GPS_TRAVEL_M:
+    continuous = _gap_at(t_s, edges) <= GPS_INTERVAL_S
+    continuous = continuous[:-1] & continuous[1:]
+    if not continuous.any() or np.sqrt(np.mean(flown[continuous] ** 2)) < LEAST_GPS_TRAVEL_M:
         return
-    slope = _slope(flown[heard].ravel(), moved[heard].ravel())
+    slope = _slope(flown[continuous].ravel(), moved[continuous].ravel())
     if not 0.2 < slope < 5.0:
         raise InputError(
             f"{where}: gps: positions move {slope:.2g} times as far as the velocities say; degrees (lat_deg, lon_deg) "

@@ -56,10 +56,10 @@ def log_of_record(path: Path, record: Record) -> Log:
             raise InputError(f"{path}: its navigator received nothing that it could use")
         _check(fed, len(segments))
         numbers = fed[:, FED.index("segment")].astype(int)
-        heard = _streams(fed)
-        if not heard:
+        streams_received = _streams(fed)
+        if not streams_received:
             raise InputError(f"{path}: its navigator received nothing that it could use")
-        streams = _with_late(heard, record.manifest.get("live"))
+        streams = _with_late(streams_received, record.manifest.get("live"))
         parts = tuple(FedSegment(_floats(segments[i]), _queue(fed, numbers == i)) for i in range(len(segments)))
     except (KeyError, IndexError, TypeError, ValueError) as error:
         raise InputError(f"{path}: not a whole record of kind {kind!r} ({error}); write it again") from error

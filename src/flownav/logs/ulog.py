@@ -12,10 +12,10 @@ from flownav.core.record import Table
 from flownav.logs import ulog_sensors as sensed
 from flownav.logs.log import SIMULATOR, VISUAL_ODOMETRY, Absence, Log, absences_of
 from flownav.logs.plausible import of_one_clock
+from flownav.logs.ulog_events import ASKED, EVENT_TOPICS, battery, happened, setpoints
+from flownav.logs.ulog_events import FIELDS as EVENT_FIELDS
 from flownav.logs.ulog_flow import FLOW_TOPICS, flow_stream, flow_topic, range_stream, reading_limits
 from flownav.logs.ulog_references import autopilot_estimate, pose_stream, truth_of
-from flownav.logs.ulog_said import ASKED, SAID, battery, happened, setpoints
-from flownav.logs.ulog_said import FIELDS as SAID_FIELDS
 from flownav.logs.ulog_topics import Topic, Topics, read_topics
 
 STATES = ("vehicle_land_detected",)
@@ -40,7 +40,7 @@ TOPICS = (
     "vehicle_attitude_groundtruth",
     "landing_target_pose",
     "irlock_report",
-    *SAID,
+    *EVENT_TOPICS,
 )
 FIELDS = frozenset(
     (
@@ -65,7 +65,7 @@ FIELDS = frozenset(
         "magnetometer_timestamp_relative",
         # landing
         "landed", "x_rel", "y_rel", "z_rel", "rel_pos_valid", "pos_x", "pos_y",
-        *SAID_FIELDS,
+        *EVENT_FIELDS,
     )
 )  # fmt: skip
 
@@ -77,7 +77,7 @@ def read_ulog(path: Path, *, flow_instance: int | None = None) -> Log:
     log lacks stands in `Log.absences`, what was thrown away in `Stream.rejected`, damage of the file in `Log.notes`.
     InputError where the file cannot be read, is no ULog, holds no known sensor, or lacks that flow instance.
     """
-    topics = read_topics(path, TOPICS, FIELDS, (*STATES, *SAID))
+    topics = read_topics(path, TOPICS, FIELDS, (*STATES, *EVENT_TOPICS))
     return log_of_topics(path, topics, flow_instance, inputs={path.name: topics.sha256})
 
 
@@ -113,9 +113,9 @@ def log_of_topics(
         absences.append(
             Absence("no vehicle_attitude", "attitude is the visual odometry's, its heading from its own start")
         )
-    said = (*topics.notes, *notes, flow_note, truth_note, pose_note, autopilot_note, *strays)
+    all_notes = (*topics.notes, *notes, flow_note, truth_note, pose_note, autopilot_note, *strays)
     return Log(
-        path, streams, origin, truth, inputs, (*filter(None, said), *_unusable(topics)),
+        path, streams, origin, truth, inputs, (*filter(None, all_notes), *_unusable(topics)),
         autopilot, _estimator(topics) if autopilot is not None else "", reading_limits(topics, flow),
         tuple(absences), clock_start_s=topics.start_s,
         truth_name=reference_name or (VISUAL_ODOMETRY if truth_note else SIMULATOR),

@@ -12,7 +12,7 @@ from flownav.logs.csv_table import columns_of, header_of
 from flownav.logs.log import Log
 from flownav.logs.topic_files import TopicFile, topic_files
 from flownav.logs.ulog import FIELDS, STATES, TOPICS, log_of_topics
-from flownav.logs.ulog_said import SAID
+from flownav.logs.ulog_events import EVENT_TOPICS
 from flownav.logs.ulog_topics import Topic, Topics, count_from_first
 
 TIME, SAMPLED = "timestamp", "timestamp_sample"  # microseconds since the vehicle was switched on
@@ -31,7 +31,7 @@ def read_topic_folder(folder: Path, *, flow_instance: int | None = None) -> Log:
         inputs[file.path.name] = digest
         found.append(topic)
     together = hashlib.sha256("".join(inputs.values()).encode()).hexdigest()
-    start_s = count_from_first(found, (*STATES, *SAID))
+    start_s = count_from_first(found, (*STATES, *EVENT_TOPICS))
     topics = Topics(found, {}, together, start_s)
     return log_of_topics(folder, topics, flow_instance, inputs=inputs, notes=(NOTE,))
 

@@ -19,6 +19,7 @@ from flownav.estimation.named import Attitude
 from flownav.estimation.states import ATTITUDE, CONSIDERS, FLOW_LAG, GYRO_BIAS, INS_ERROR, MEASURED
 from flownav.navigation import calls
 from flownav.navigation.heading import HeadingVerdict, conclude_heading, offered_heading
+from flownav.navigation.kernel_settings import FROM_ATTITUDE, AttitudeSettings, Equipment
 from flownav.navigation.memory import LEVEL_READ, MEMORY, share, shared
 from flownav.navigation.motion_records import BridgeMemory, ImuMemory
 from flownav.navigation.offers import conclude, observe_innovation
@@ -26,7 +27,6 @@ from flownav.navigation.packed import load_attitude_settings
 from flownav.navigation.reasons import FUSED, SILENT, usable_in_flight
 from flownav.navigation.records import AidMemory, HeadingMemory, Reading, StartMemory
 from flownav.navigation.tape import Output
-from flownav.navigation.told import FROM_ATTITUDE, AttitudeSettings, Equipment
 from flownav.navigation.verdicts import Offer, on_lanes
 
 # 1.1 deg between two logged attitudes: chosen, not measured. Without the bridge a gap of 3 s in a turn costs a radian

@@ -10,13 +10,13 @@ from flownav.estimation.laws.height import baro_altitude
 from flownav.estimation.named import PositionNed
 from flownav.estimation.states import ACCEL_BIAS, BARO, GROUND, POSITION, VELOCITY
 from flownav.navigation import calls
+from flownav.navigation.kernel_settings import HeightSettings
 from flownav.navigation.memory import GROUNDED
 from flownav.navigation.offers import conclude, note_height
 from flownav.navigation.packed import load_height_settings
 from flownav.navigation.reasons import FUSED, usable_in_flight
 from flownav.navigation.records import BaroMemory, NoiseMemory, Reading, StartMemory
 from flownav.navigation.tape import BARO_FOUND, Output
-from flownav.navigation.told import HeightSettings
 from flownav.navigation.trust import OF_BARO, follow_noise
 from flownav.navigation.verdicts import UNKNOWN_M, Event, Offer, Reset, on_lanes
 

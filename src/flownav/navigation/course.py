@@ -16,7 +16,7 @@ from flownav.estimation.named import Attitude, rotation_by
 from flownav.estimation.states import ATTITUDE
 from flownav.navigation import calls
 from flownav.navigation.motion_records import CourseMemory
-from flownav.navigation.reasons import is_heard
+from flownav.navigation.reasons import is_received
 from flownav.navigation.records import HeadingMemory, Look, Reading
 from flownav.navigation.tape import HEADING_FOUND
 from flownav.navigation.verdicts import Event, Reset, on_lanes
@@ -80,7 +80,7 @@ def judge_course(m: CourseMemory) -> tuple[bool, float]:
 @equation
 def is_velocity(reading: Reading) -> bool:
     """Whether a GPS velocity was received, with finite north and east components."""
-    return is_heard(reading) and bool(np.isfinite(reading.value_0 + reading.value_1))
+    return is_received(reading) and bool(np.isfinite(reading.value_0 + reading.value_1))
 
 
 @equation
@@ -111,7 +111,7 @@ def note_flow_course(
     y = reading.value_1 - (look.turning_y if angular else 0.0)
     u, v = velocity_from_flow(x, y, look.range_m) if angular else (x, y)
     cosine, sine = heading_cosine_sine(rotation_by(own))
-    counts = (not sought or heading.sought > 0.0) and is_heard(reading) and bool(np.isfinite(u + v))
+    counts = (not sought or heading.sought > 0.0) and is_received(reading) and bool(np.isfinite(u + v))
     north, east = turned_level(u, v, cosine, sine)
     return with_flow(north, east, t_s, m) if counts else m
 

@@ -15,7 +15,7 @@ from flownav.estimation.hypotheses import (
     TURNING,
     Size,
     effect_of,
-    size_told,
+    size_from_evidence,
 )
 from flownav.estimation.states import POSITION
 
@@ -55,7 +55,7 @@ def least_size(fault: int) -> float:
 @equation
 def size_in(work: Work, lanes: Lanes, fault: int, lane: int) -> Size:
     """Estimated size of a fault in a lane, with its standard deviation and evidence."""
-    return size_told(work, lanes, fault, lane, prior_sigma(fault))
+    return size_from_evidence(work, lanes, fault, lane, prior_sigma(fault))
 
 
 @equation

@@ -3,8 +3,8 @@
 import numpy as np
 
 from flownav.core.measurement import Array, Sensor, Stream
+from flownav.navigation.kernel_settings import FROM_ATTITUDE, FROM_MAG, FROM_YAW, NO_HEADING, Equipment
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.told import FROM_ATTITUDE, FROM_MAG, FROM_YAW, NO_HEADING, Equipment
 from flownav.sensors.magnetometer import declination_rad
 
 # chosen: 25 Hz (dataflash/heli_sitl) gives 0.05 m rms (league.md); voxl's IMU of 2 Hz is passed over
@@ -27,12 +27,12 @@ def heading_source(streams: dict[Sensor, Stream]) -> float:
     """Where headings come from: a magnetometer's north is the frame's, with GPS or without; an attitude's heading is
     one only in a frame of the earth.
     """
-    told = FROM_YAW if Sensor.YAW in streams and len(streams[Sensor.YAW]) else NO_HEADING
+    source = FROM_YAW if Sensor.YAW in streams and len(streams[Sensor.YAW]) else NO_HEADING
     if Sensor.MAG in streams and len(streams[Sensor.MAG]):
         return FROM_MAG
     if Sensor.GPS_POSITION not in streams and Sensor.GPS_VELOCITY not in streams:
-        return told
-    return FROM_ATTITUDE if Sensor.ATTITUDE in streams else told
+        return source
+    return FROM_ATTITUDE if Sensor.ATTITUDE in streams else source
 
 
 def equipment_of(

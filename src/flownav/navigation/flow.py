@@ -37,14 +37,14 @@ from flownav.navigation.flow_noise import (
     lasting_walk,
     wrong_since,
 )
+from flownav.navigation.kernel_settings import FlowSettings, carries_lag, flow_gain
 from flownav.navigation.lagged_flow import observe_lagged
-from flownav.navigation.memory import RANGE_MISSING, SCALE_UNTOLD, holds
+from flownav.navigation.memory import RANGE_MISSING, SCALE_UNSTATED, holds
 from flownav.navigation.offers import conclude, note_aid
 from flownav.navigation.packed import load_flow_settings
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT, component_of
 from flownav.navigation.records import FlowInnovation, FlowMemory, GpsMemory, Look, Reading
 from flownav.navigation.tape import FLOW_DOUBTED, FLOW_TRUSTED, Output
-from flownav.navigation.told import FlowSettings, carries_lag, flow_gain
 from flownav.navigation.trust import watch_whiteness
 from flownav.navigation.verdicts import (
     NO_EVENT,
@@ -240,7 +240,7 @@ def consider_others(work: Work, lanes: Lanes) -> None:
     """
     consider(work, lanes, POSITION + 2, RANGE_MISSING)
     consider(work, lanes, GROUND, RANGE_MISSING)
-    consider(work, lanes, FLOW_SCALE, SCALE_UNTOLD)
+    consider(work, lanes, FLOW_SCALE, SCALE_UNSTATED)
     consider(work, lanes, ATTITUDE + 2)
     consider(work, lanes, GYRO_BIAS + 2)
     consider(work, lanes, INS_ERROR + 2)

@@ -9,6 +9,7 @@ from flownav.estimation.laws import lens_range
 from flownav.navigation import calls
 from flownav.navigation.flow_noise import LONGEST_STEP_S
 from flownav.navigation.height import MANY_STRAYS
+from flownav.navigation.kernel_settings import FlowSettings
 from flownav.navigation.memory import holds
 from flownav.navigation.reasons import (
     FUSED,
@@ -18,7 +19,7 @@ from flownav.navigation.reasons import (
     OUT_OF_RANGE,
     SILENT,
     TILTED,
-    is_heard,
+    is_received,
     usable_in_flight,
 )
 from flownav.navigation.records import (
@@ -33,7 +34,6 @@ from flownav.navigation.records import (
     Reading,
     StartMemory,
 )
-from flownav.navigation.told import FlowSettings
 from flownav.navigation.verdicts import Biases, GroundBelow, HeldBack, on_lanes
 
 with_turning = replacing(Look, "turning_x", "turning_y")
@@ -62,8 +62,8 @@ class Summed(NamedTuple):
 @on_lanes(calls.sum_looks)
 def sum_looks(reading: Reading, m: FlowSum, *, t_s: float) -> Summed:
     """Looks of an angular flow that are shorter than LEAST_LOOK_S are summed up to one that is not: its mean."""
-    look_s = t_s - m.heard_s
-    alone = not is_heard(reading) or not look_s < LEAST_LOOK_S or not np.isfinite(reading.value_0 + reading.value_1)
+    look_s = t_s - m.received_s
+    alone = not is_received(reading) or not look_s < LEAST_LOOK_S or not np.isfinite(reading.value_0 + reading.value_1)
     new = FlowSum(
         t_s, m.looked_s + look_s, m.x + look_s * reading.value_0, m.y + look_s * reading.value_1,
         m.own_x + look_s * reading.value_2, m.own_y + look_s * reading.value_3, m.imu_x + look_s * reading.value_4,
@@ -75,7 +75,7 @@ def sum_looks(reading: Reading, m: FlowSum, *, t_s: float) -> Summed:
         reading, value_0=per * new.x, value_1=per * new.y, value_2=per * new.own_x, value_3=per * new.own_y,
         value_4=per * new.imu_x, value_5=per * new.imu_y, quality=per * new.quality,
     )  # fmt: skip
-    nothing = FlowSum(t_s if reading.arrived > 0.0 else m.heard_s, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    nothing = FlowSum(t_s if reading.arrived > 0.0 else m.received_s, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     waits = with_arrival(reading, arrived=0.0)
     return Summed(reading if alone else (mean if ends else waits), nothing if alone or ends else new)
 
@@ -123,7 +123,7 @@ def see_ground(
     spread_m = np.sqrt(larger(below.variance, 0.0))
     known = ground.known > 0.0 and spread_m <= LARGEST_SPREAD * range_m
     disputed = np.isfinite(ranged.refused_s) or echo.stray > MANY_STRAYS
-    told = t_s - ranged.taken_s <= s.height_hold_s and not disputed
+    ranged_lately = t_s - ranged.taken_s <= s.height_hold_s and not disputed
     newest = t_s - ranged.tested_s <= DISPUTES_S
     return Look(
         turning_x=0.0,
@@ -131,7 +131,7 @@ def see_ground(
         range_m=range_m if known else UNKNOWN_RANGE_M,
         known=1.0 if known else 0.0,
         upright=below.rotation[8],
-        unranged=0.0 if told else 1.0,
+        unranged=0.0 if ranged_lately else 1.0,
         disputed_m=abs(ranged.contradiction_m) if newest and known else 0.0,
         reason=SILENT,
         unscaled=1.0,

@@ -6,8 +6,8 @@ import numpy as np
 
 from flownav.core.compile import clamp, equation, larger, smaller
 from flownav.navigation.height import range_variance
+from flownav.navigation.kernel_settings import FlowSettings
 from flownav.navigation.records import FlowMemory, Look
-from flownav.navigation.told import FlowSettings
 from flownav.sensors.flow import flow_noise_sigma
 
 SMALLEST_EXCESS, LARGEST_EXCESS = 0.25, 400.0  # half and 20 times sigma: chosen; both ends held by test_trust

@@ -13,6 +13,7 @@ from flownav.estimation.laws.still import pad_below
 from flownav.estimation.states import GPS_FAST, GPS_SLOW, GPS_VELOCITY, PAD, POSITION, STATE, VELOCITY
 from flownav.navigation import calls
 from flownav.navigation.fault_signs import sign_drift
+from flownav.navigation.kernel_settings import GpsSettings
 from flownav.navigation.memory import MEMORY
 from flownav.navigation.motion_records import SteadyForce
 from flownav.navigation.offers import (
@@ -38,7 +39,6 @@ from flownav.navigation.records import (
     StartMemory,
 )
 from flownav.navigation.tape import GPS_RESET, Output
-from flownav.navigation.told import GpsSettings
 from flownav.navigation.trust import OF_GPS, SMALLEST_NOISE, followed_noise, scale_noise
 from flownav.navigation.verdicts import Event, Force, Noise, Offer, Reset, Tested, on_lanes
 
@@ -53,7 +53,7 @@ UNKNOWN_PAD_M = 100.0  # as good as unknown: the tie to the vehicle that follows
 LEAST_PAD_VARIANCE_M2 = 1e-6  # chosen: 1 mm, so that a tie is never exact
 
 with_fused = replacing(RejectionMemory, "fused_s")
-with_reset = replacing(GpsMemory, "told_s", "moved_n_m", "moved_e_m")
+with_reset = replacing(GpsMemory, "last_fix_s", "moved_n_m", "moved_e_m")
 
 
 # -- the filter's estimates -------------------------------------------------------------------------------------
@@ -192,7 +192,7 @@ class FixFate(NamedTuple):
 
     memory: FixMemory
     goes: tuple[Reset, Reset, Reset]
-    told: Event
+    event: Event
     pad: Reset
     tie: Offer
     pad_goes: bool
@@ -211,7 +211,7 @@ def judge_fate(
     m, gps, pad = memory
     position, axis = place < 3, place if place < 3 else place - 3
     value, _ = component_of(reading, axis)
-    heard = reading.arrived > 0.0
+    here = reading.arrived > 0.0
     doubted = flow.doubted > 0.0 or bool(np.isfinite(flow.wrong_s))
     ratio = gate_ratio(tested, s.gate_sigma) if tested.reason == INNOVATION_GATE else 0.0
     flowed = not doubted and t_s - flow.taken_s <= MOMENT_S
@@ -219,16 +219,16 @@ def judge_fate(
     seen = above if axis == 2 else flowed
     reset, after = judge_rejections(ratio, position, doubted, t_s, m, s, seen)
     after = with_fused(after, fused_s=t_s) if tested.reason == FUSED else after
-    goes = heard and reset
+    goes = here and reset
     by = value - (along.position_m if position else along.velocity_m_s)
     moved = by if goes and position else 0.0  # whether GPS jumped or the filter was wrong is unknown
     pad_goes = goes and position and not doubted and pad.known > 0.0
     return FixFate(
         FixMemory(
-            after if heard else m,
+            after if here else m,
             with_reset(
                 gps,
-                told_s=t_s if axis < 2 and tested.reason == FUSED else gps.told_s,
+                last_fix_s=t_s if axis < 2 and tested.reason == FUSED else gps.last_fix_s,
                 moved_n_m=gps.moved_n_m + (moved if axis == 0 else 0.0),
                 moved_e_m=gps.moved_e_m + (moved if axis == 1 else 0.0),
             ),

@@ -13,8 +13,8 @@ from flownav.core.compile import equation, larger, smaller
 from flownav.estimation.named import VelocityNed
 from flownav.estimation.states import GROUND, PAD
 from flownav.navigation import calls
+from flownav.navigation.kernel_settings import HeightSettings, PlaceSettings
 from flownav.navigation.motion_records import DriftMemory
-from flownav.navigation.told import HeightSettings, PlaceSettings
 from flownav.navigation.verdicts import Doubt, GroundBelow, on_lanes
 
 DRIFT_S = 5.0  # chosen: who sways about one place, in gusts, passes over no new ground and goes nowhere

@@ -13,13 +13,13 @@ from flownav.estimation.laws.attitude import heading
 from flownav.estimation.named import Attitude
 from flownav.estimation.states import ATTITUDE, INS_ERROR
 from flownav.navigation import calls
+from flownav.navigation.kernel_settings import FROM_YAW, AttitudeSettings, Equipment
 from flownav.navigation.memory import holds
 from flownav.navigation.offers import conclude, offer_what_is_sound
 from flownav.navigation.packed import load_attitude_settings
-from flownav.navigation.reasons import FUSED, INNOVATION_GATE, NO_HEADING, SILENT, is_heard, usable_in_flight
+from flownav.navigation.reasons import FUSED, INNOVATION_GATE, NO_HEADING, SILENT, is_received, usable_in_flight
 from flownav.navigation.records import GpsMemory, HeadingMemory, Reading, StartMemory
 from flownav.navigation.tape import Output
-from flownav.navigation.told import FROM_YAW, AttitudeSettings, Equipment
 from flownav.navigation.verdicts import Doubt, Fate, Noise, Offer, Tested, on_lanes
 
 LEAST_FIELD_GAUSS = 1e-3  # chosen: hundreds of times less than the level field but near the magnetic poles
@@ -135,14 +135,14 @@ def judge_field(
 
 @on_lanes(calls.judge_yaw)
 def judge_yaw(
-    reading: Reading, start: StartMemory, m: HeadingMemory, *, t_s: float, told: bool, s: AttitudeSettings
+    reading: Reading, start: StartMemory, m: HeadingMemory, *, t_s: float, stated_apart: bool, s: AttitudeSettings
 ) -> HeadingVerdict:
     """An external heading; before the start it is noted as the angle to north, as that of a level field is.
 
     told: the filter's first heading is to be this one.
     """
     reason = usable_in_flight(reading, reading.value_0, 0.0, start.started)
-    noted = told and start.started == 0.0 and is_heard(reading) and bool(np.isfinite(reading.value_0))
+    noted = stated_apart and start.started == 0.0 and is_received(reading) and bool(np.isfinite(reading.value_0))
     after = with_field(m, field_rad=-reading.value_0 if noted else m.field_rad)
     return offered_heading(t_s, reading.value_0, reading.variance_0, reason, after, s)
 

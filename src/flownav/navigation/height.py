@@ -9,6 +9,7 @@ from flownav.estimation.hypotheses import RANGE_OFFSET
 from flownav.estimation.laws.height import range_along_boresight
 from flownav.estimation.states import GROUND, POSITION
 from flownav.navigation import calls
+from flownav.navigation.kernel_settings import HeightSettings
 from flownav.navigation.motion_records import ImuMemory
 from flownav.navigation.offers import conclude, fuse_offered, weigh_strays
 from flownav.navigation.packed import load_height_settings
@@ -34,7 +35,6 @@ from flownav.navigation.records import (
     StartMemory,
 )
 from flownav.navigation.tape import GROUND_FOUND, GROUND_RESET, RANGE_STUCK, Output
-from flownav.navigation.told import HeightSettings
 from flownav.navigation.trust import OF_RANGE, STRAY_SHARE, creeps, follow_noise, watch_whiteness
 from flownav.navigation.verdicts import (
     NO_EVENT,
@@ -71,7 +71,7 @@ UNAIDED_TRAVEL_RATIO = 5.0  # times the travel, where nothing else measures the 
 
 
 with_value = replacing(RangeMemory, "last_m", "same_s", "down_m")
-with_report = replacing(RangeMemory, "said_s")
+with_report = replacing(RangeMemory, "stuck_s")
 with_taken = replacing(RangeMemory, "taken_s", "refused_s")
 with_sigmas = replacing(RangeMemory, "sigmas", "off_m")
 with_test = replacing(RangeMemory, "tested_s", "contradiction_m", "before_m")
@@ -107,8 +107,8 @@ def repeats(t_s: float, m: RangeMemory, height: Height, alone: bool, s: HeightSe
     travelled = abs(height.pos_d_m - m.down_m)
     drift = 3.0 * height.speed_sigma_m_s * lasting_s
     served = m.taken_s >= m.same_s - SERVED_S
-    told = s.range_stuck_travel_m if served and lasting_s < LONGEST_REPEAT_S else 0.0
-    least = UNAIDED_TRAVEL_RATIO * s.range_stuck_travel_m + drift if alone else told
+    least_served = s.range_stuck_travel_m if served and lasting_s < LONGEST_REPEAT_S else 0.0
+    least = UNAIDED_TRAVEL_RATIO * s.range_stuck_travel_m + drift if alone else least_served
     return lasting_s >= s.range_stuck_s and travelled >= least
 
 
@@ -211,12 +211,12 @@ def judge_range(
     m, echo, g = memory
     alone = t_s - aid.height_s > s.height_hold_s
     reason, variance, m = range_verdict(reading, t_s, start.started, height, alone, m, s)
-    still = reason == STUCK and abs(height.pos_d_m - m.down_m) >= s.range_stuck_travel_m and m.said_s != m.same_s
-    m = with_report(m, said_s=m.same_s) if still else m
-    heard = reason == FUSED
-    echo = followed_echo(reading.value_0, height.pos_d_m, echo) if heard else echo
+    still = reason == STUCK and abs(height.pos_d_m - m.down_m) >= s.range_stuck_travel_m and m.stuck_s != m.same_s
+    m = with_report(m, stuck_s=m.same_s) if still else m
+    taken = reason == FUSED
+    echo = followed_echo(reading.value_0, height.pos_d_m, echo) if taken else echo
     sought = sought_ground(reading, t_s, height, alone, g, GROUND_FOUND, s)
-    seeks = heard and g.known == 0.0
+    seeks = taken and g.known == 0.0
     found = seeks and sought.found
     return RangeVerdict(
         RangingMemory(

@@ -6,6 +6,7 @@ import numpy as np
 
 from flownav.core.compile import equation, larger, replacing
 from flownav.navigation import calls
+from flownav.navigation.kernel_settings import ImuSettings
 from flownav.navigation.motion_records import (
     ForceBlocks,
     ImuMemory,
@@ -16,10 +17,9 @@ from flownav.navigation.motion_records import (
     SteadyForce,
     ToneMemory,
 )
-from flownav.navigation.notch import heard_tones, is_notched
+from flownav.navigation.notch import is_notched, tracked_tones
 from flownav.navigation.records import Reading, StartMemory
 from flownav.navigation.tape import IMU_LOST
-from flownav.navigation.told import ImuSettings
 from flownav.navigation.trust import AccelFactors
 from flownav.navigation.verdicts import AppliedMotion, Event, Force, MotionNoise, on_lanes
 from flownav.navigation.vibration import (
@@ -58,13 +58,13 @@ def size_of(r: Reading) -> float:
 
 
 @equation
-def said_by(reading: Reading) -> Motion:
+def motion_of(reading: Reading) -> Motion:
     """Body rate [rad/s] and specific force [m/s2] of an inertial reading."""
     return (reading.value_0, reading.value_1, reading.value_2, reading.value_3, reading.value_4, reading.value_5)
 
 
 @equation
-def remembered(m: ImuMemory) -> Motion:
+def last_motion(m: ImuMemory) -> Motion:
     """Body rate [rad/s] and specific force [m/s2] of the newest reading that was kept."""
     return (m.gyro_x, m.gyro_y, m.gyro_z, m.accel_x, m.accel_y, m.accel_z)
 
@@ -76,7 +76,7 @@ def without_tones(motion: Motion, m: ToneMemory) -> Motion:
 
 
 @equation
-def told_noise(least: float, whole: float, left: float, s: ImuSettings) -> float:
+def noise_density(least: float, whole: float, left: float, s: ImuSettings) -> float:
     """Density of the accelerometer's noise [m/s2/sqrt(Hz)]: as stated, or more where its readings show more: their
     whole power, or what the notches leave of it.
     """
@@ -155,24 +155,24 @@ class StepMotion(NamedTuple):
 @on_lanes(calls.judge_motion)
 def judge_motion(
     reading: Reading, start: StartMemory, memory: MotionMemory, blocks: ForceBlocks, doubt: AccelFactors,
-    *, t_s: float, step_s: float, heard: bool, s: ImuSettings,
+    *, t_s: float, step_s: float, arrived_now: bool, s: ImuSettings,
 ) -> StepMotion:  # fmt: skip
     """The motion that moves the filter over the step to t_s, from the readings at its ends, the newest reading, or
     none.
 
-    heard: an inertial reading is at hand; where none ever is, none stands for the step. After a gap it knows nothing of
+    arrived_now: an inertial reading is at hand; where none ever is, none stands for the step. After a gap it knows nothing of
     the gap, which is coasted. Where no time passes there is no gap.
     """
     m, spent, owed, before = memory
     started = start.started > 0.0
     period_s = t_s - m.read_s
     fresh = period_s <= s.imu_stale_s
-    now = heard and sound(reading)
+    now = arrived_now and sound(reading)
     loses = now and not fresh and np.isfinite(m.read_s) and started
-    held = without_tones(remembered(m), before)
+    held = without_tones(last_motion(m), before)
     force = (reading.value_3, reading.value_4, reading.value_5)
-    tones = heard_tones(force, held[3:6], before, period_s if fresh else 0.0, s) if now and is_notched(s) else before
-    between = motion_between(held, without_tones(said_by(reading), tones), s.imu_integrates)
+    tones = tracked_tones(force, held[3:6], before, period_s if fresh else 0.0, s) if now and is_notched(s) else before
+    between = motion_between(held, without_tones(motion_of(reading), tones), s.imu_integrates)
     moving = fresh and started
     p = paid(between[0], held[0], spent.gyro_x, owed.gyro_x, step_s, period_s, now, moving)
     q = paid(between[1], held[1], spent.gyro_y, owed.gyro_y, step_s, period_s, now, moving)
@@ -181,10 +181,10 @@ def judge_motion(
     y = paid(between[4], held[4], spent.accel_y, owed.accel_y, step_s, period_s, now, moving)
     z = paid(between[5], held[5], spent.accel_z, owed.accel_z, step_s, period_s, now, moving)
     least_down = s.accel_noise_m_s2_rt_hz * s.accel_noise_down_share
-    told = told_noise(s.accel_noise_m_s2_rt_hz, larger(m.accel_power, blocks.power), tones.noise_power, s)
-    told_down = told_noise(least_down, m.accel_power, tones.noise_power, s)
-    accel = doubt.level * told if moving else s.coasting_accel_m_s2_rt_hz
-    accel_down = larger(doubt.level, doubt.down) * told_down if moving else s.coasting_accel_m_s2_rt_hz
+    density = noise_density(s.accel_noise_m_s2_rt_hz, larger(m.accel_power, blocks.power), tones.noise_power, s)
+    noise_down = noise_density(least_down, m.accel_power, tones.noise_power, s)
+    accel = doubt.level * density if moving else s.coasting_accel_m_s2_rt_hz
+    accel_down = larger(doubt.level, doubt.down) * noise_down if moving else s.coasting_accel_m_s2_rt_hz
     gyro = (
         turning_noise(r.value, m.gyro_power, s) if moving else s.coasting_rate_rad_s_rt_hz * s.coasting_rate_rad_s_rt_hz
     )

@@ -7,8 +7,8 @@ from flownav.estimation.covariance import forget_lane
 from flownav.estimation.lag import FlowLag, lag_of_step
 from flownav.estimation.laws.flow import lagged_flow, lagged_flow_rate
 from flownav.estimation.states import FLOW_LAG, STATE, STATES_WITH_LAG
+from flownav.navigation.kernel_settings import FlowSettings
 from flownav.navigation.memory import set_lane
-from flownav.navigation.told import FlowSettings
 
 
 @equation

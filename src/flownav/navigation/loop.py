@@ -7,13 +7,7 @@ import numpy as np
 
 from flownav.core.compile import ONE_LANE, Work, equation, invoke, kernel, pointer
 from flownav.core.measurement import MAX_VALUES, Array, EventQueue
-from flownav.navigation.memory import CLOCK, READING, new_work
-from flownav.navigation.packed import pack
-from flownav.navigation.records import Reading
-from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.take import navigator_unit
-from flownav.navigation.tape import Output, Tape, room_of
-from flownav.navigation.told import (
+from flownav.navigation.kernel_settings import (
     FROM_ATTITUDE,
     FROM_MAG,
     NO_STATED_NOISE,
@@ -22,6 +16,12 @@ from flownav.navigation.told import (
     NavigatorSettings,
     carries_lag,
 )
+from flownav.navigation.memory import CLOCK, READING, new_work
+from flownav.navigation.packed import pack
+from flownav.navigation.records import Reading
+from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.navigation.take import navigator_unit
+from flownav.navigation.tape import Output, Tape, room_of
 
 STATED_VARIANCES = 3  # variances that a reading carries
 
@@ -29,7 +29,7 @@ STATED_VARIANCES = 3  # variances that a reading carries
 class Running(NamedTuple):
     """A navigator at work on one lane: its settings, its lane buffer, and the tape it writes."""
 
-    told: NavigatorSettings
+    given: NavigatorSettings
     settings: Array
     work: Array
     tape: Tape
@@ -48,11 +48,11 @@ def start_navigator(
 ) -> Running:
     """A new navigator. noise: the flow's noise by a sensor file."""
     headed = equipment.heading in (FROM_MAG, FROM_ATTITUDE) or equipment.use_attitude
-    told = settings.settings(equipment, noise)
+    given = settings.settings(equipment, noise)
     sigma = settings.start_sigma(
         has_heading=headed, compass=equipment.heading == FROM_MAG, scale=bool(np.isfinite(equipment.deadline_s))
     )
-    return Running(told, pack(told, sigma), new_work(ONE_LANE), tape)
+    return Running(given, pack(given, sigma), new_work(ONE_LANE), tape)
 
 
 def run(queue: EventQueue, on: Running, *, compiled: bool = True, instead: int | None = None) -> None:
@@ -61,7 +61,7 @@ def run(queue: EventQueue, on: Running, *, compiled: bool = True, instead: int |
     compiled False: in plain Python, step by step (tests; it is a thousand times slower). instead: the address of what
     takes the readings in place of the navigator (`navigation.take.UNIT_SIGNATURE`).
     """
-    unit = navigator_unit(ONE_LANE, carries_lag(on.told.flow))
+    unit = navigator_unit(ONE_LANE, carries_lag(on.given.flow))
     take: Any = instead
     if instead is None:
         take = unit.address if compiled else unit.python

@@ -100,7 +100,7 @@ OBSERVATION = MEMORY.take(1)
 MEMORY.keep(Look)
 MEMORY.keep(FlowInnovation, 3, "component")
 RANGE_MISSING = MEMORY.row(Look, "unranged")
-SCALE_UNTOLD = MEMORY.row(Look, "unscaled")
+SCALE_UNSTATED = MEMORY.row(Look, "unscaled")
 SCALE_DOUBT = MEMORY.keep(ScaleDoubt)
 MEMORY.keep(SteadyForce)
 MEMORY.keep(DriftMemory)
@@ -182,7 +182,7 @@ def share(work: Work, lanes: Lanes, row: int, value: float) -> None:
 @equation
 def holds(gps: GpsMemory, t_s: float) -> bool:
     """Whether GPS measured the horizontal velocity or position lately."""
-    return t_s - gps.told_s <= UNHELD_S
+    return t_s - gps.last_fix_s <= UNHELD_S
 
 
 @equation

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 from flownav.core.compile import clamp, cos, equation, exp, sin
 from flownav.core.frames import turned_level, within_half_turn
+from flownav.navigation.kernel_settings import ImuSettings
 from flownav.navigation.motion_records import ToneMemory
-from flownav.navigation.told import ImuSettings
 from flownav.navigation.vibration import FOLLOWING_S
 
 LEAST_NOTCH_HZ = 8.0  # chosen: a notch below would take the vehicle's own motion
@@ -123,7 +123,7 @@ def followed_density(power: float, change: float, before: float, dt_s: float) ->
 
 
 @equation
-def heard_tones(force: Force, before: Force, m: ToneMemory, dt_s: float, s: ImuSettings) -> ToneMemory:
+def tracked_tones(force: Force, before: Force, m: ToneMemory, dt_s: float, s: ImuSettings) -> ToneMemory:
     """Both tones in the specific force (body FRD) of a reading, dt_s after the one before.
 
     before: what was left of the reading before. What is steady is no tone's, and would pull the frequencies. Of white

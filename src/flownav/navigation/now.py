@@ -37,7 +37,7 @@ from flownav.estimation.states import (
     VELOCITY,
 )
 from flownav.estimation.transition import block_ahead, block_place
-from flownav.navigation.inertial import Motion, motion_between, remembered
+from flownav.navigation.inertial import Motion, last_motion, motion_between
 from flownav.navigation.memory import CLOCK, MEMORY, PROTECTION, SUSPECTED, load_aid, load_imu, shared
 from flownav.navigation.packed import load_equipment, load_filter_settings, load_imu_settings
 from flownav.navigation.waiting import load_inertial, load_queue, load_sizes, ring_row
@@ -89,7 +89,7 @@ AT = places_of(NowRow)
 
 
 # -- the state ------------------------------------------------------------------------------------------------
-class Carried(NamedTuple):
+class NowState(NamedTuple):
     """A state on its way: position NED [m], velocity NED [m/s], quaternion body to earth, and the IMU's biases."""
 
     pos_n: float
@@ -110,12 +110,12 @@ class Carried(NamedTuple):
     accel_bias_z: float
 
 
-MEMORY.name(Carried, *(ROWS_BY_NAME[name] for name in Carried._fields))
-state_of, _ = MEMORY.access(Carried)
+MEMORY.name(NowState, *(ROWS_BY_NAME[name] for name in NowState._fields))
+state_of, _ = MEMORY.access(NowState)
 
 
 @equation
-def carried(s: Carried, between: Motion, dt_s: float) -> Carried:
+def moved_on(s: NowState, between: Motion, dt_s: float) -> NowState:
     """The state dt later; between: what the IMU read over that time, biases and all (`inertial.motion_between`)."""
     moved = _strapdown(
         PositionNed(s.pos_n, s.pos_e, s.pos_d),
@@ -126,7 +126,7 @@ def carried(s: Carried, between: Motion, dt_s: float) -> Carried:
         AccelBias(s.accel_bias_x, s.accel_bias_y, s.accel_bias_z),
         dt_s,
     )
-    return Carried(
+    return NowState(
         moved.pos_n, moved.pos_e, moved.pos_d, moved.vel_n, moved.vel_e, moved.vel_d,
         moved.qw, moved.qx, moved.qy, moved.qz,
         s.gyro_bias_x, s.gyro_bias_y, s.gyro_bias_z, s.accel_bias_x, s.accel_bias_y, s.accel_bias_z,
@@ -134,9 +134,9 @@ def carried(s: Carried, between: Motion, dt_s: float) -> Carried:
 
 
 @equation
-def coasted(s: Carried, dt_s: float) -> Carried:
+def coasted(s: NowState, dt_s: float) -> NowState:
     """The state dt later where no IMU serves: attitude and velocity are held."""
-    return Carried(
+    return NowState(
         s.pos_n + dt_s * s.vel_n, s.pos_e + dt_s * s.vel_e, s.pos_d + dt_s * s.vel_d, s.vel_n, s.vel_e, s.vel_d,
         s.qw, s.qx, s.qy, s.qz,
         s.gyro_bias_x, s.gyro_bias_y, s.gyro_bias_z, s.accel_bias_x, s.accel_bias_y, s.accel_bias_z,
@@ -144,16 +144,16 @@ def coasted(s: Carried, dt_s: float) -> Carried:
 
 
 @procedure
-def state_now(work: Work, r: Work, p: Work, t_s: float) -> tuple[Carried, Three]:
+def state_now(work: Work, r: Work, p: Work, t_s: float) -> tuple[NowState, Three]:
     """The state at an instant, and the body rate then; after the last inertial reading the last stands."""
     state, at_s = state_of(work, ONE_LANE, 0), shared(work, ONE_LANE, CLOCK)
     rate = (0.0, 0.0, 0.0)
     if load_equipment(p).use_imu:
         integrates = load_imu_settings(p).imu_integrates
-        before = remembered(load_imu(work, ONE_LANE, 0))
+        before = last_motion(load_imu(work, ONE_LANE, 0))
         state, at_s, before = _through_readings(r, state, at_s, before, integrates, t_s)
         if t_s > at_s:
-            state = carried(state, before, t_s - at_s)
+            state = moved_on(state, before, t_s - at_s)
         rate = (before[0] - state.gyro_bias_x, before[1] - state.gyro_bias_y, before[2] - state.gyro_bias_z)
     else:
         state = coasted(state, t_s - at_s)
@@ -162,8 +162,8 @@ def state_now(work: Work, r: Work, p: Work, t_s: float) -> tuple[Carried, Three]
 
 @equation
 def _through_readings(
-    r: Work, state: Carried, at_s: float, before: Motion, integrates: float, t_s: float
-) -> tuple[Carried, float, Motion]:
+    r: Work, state: NowState, at_s: float, before: Motion, integrates: float, t_s: float
+) -> tuple[NowState, float, Motion]:
     """Through the readings later than at_s that are no spikes."""
     s, q, clock_s = load_sizes(r, ONE_LANE, 0), load_queue(r, ONE_LANE, 0), at_s
     for k in range(int(q.count)):
@@ -172,7 +172,7 @@ def _through_readings(
             now = (one.gyro_x, one.gyro_y, one.gyro_z, one.accel_x, one.accel_y, one.accel_z)
             until_s = min(one.t_s, t_s)
             if until_s > at_s:
-                state = carried(state, motion_between(before, now, integrates), until_s - at_s)
+                state = moved_on(state, motion_between(before, now, integrates), until_s - at_s)
                 at_s = until_s
             before = now
     return state, at_s, before

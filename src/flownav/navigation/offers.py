@@ -10,6 +10,7 @@ from flownav.estimation.covariance import expect, settle, states_of
 from flownav.estimation.hypotheses import weigh
 from flownav.navigation import calls
 from flownav.navigation.journal import note_correction
+from flownav.navigation.kernel_settings import AidSettings
 from flownav.navigation.memory import CLOCK, NEWEST_OF_SENSOR, share, shared
 from flownav.navigation.reasons import (
     DUPLICATE,
@@ -21,7 +22,6 @@ from flownav.navigation.reasons import (
 )
 from flownav.navigation.records import AidMemory, EchoMemory, LevelMemory, Reading
 from flownav.navigation.tape import AIDED_AGAIN, DEAD_RECKONING, POSITION_INVALID, Output, write_offer
-from flownav.navigation.told import AidSettings
 from flownav.navigation.verdicts import Accepted, Event, Fate, Noise, Observation, Offered, Tested, on_lanes
 
 CLOCK_SLACK_S = 1e-6  # the tick of logged times

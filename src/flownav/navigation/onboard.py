@@ -41,9 +41,9 @@ from flownav.navigation.progress import (
     LONGEST_AHEAD_S,
     NOT_STARTED,
     STALE,
+    STATE_GIVEN,
     TAKEN,
     TAKING,
-    TOLD,
     Progress,
     begin_anew,
     hear,
@@ -272,7 +272,7 @@ def tell_board(work: Work, rings: Work, p: Work, at: Work, out: Work) -> None:
     elif not (ahead_s >= 0.0 and ahead_s <= LONGEST_AHEAD_S):
         out[0] = STALE
     else:
-        out[0] = TOLD
+        out[0] = STATE_GIVEN
         tell_now(work, rings, p, at[0], out)
 
 

@@ -7,19 +7,19 @@ import numpy as np
 from flownav.core.compile import flat_access
 from flownav.core.measurement import Array
 from flownav.estimation.error_models import FilterSettings
-from flownav.navigation import told
-from flownav.navigation.told import NavigatorSettings
+from flownav.navigation import kernel_settings
+from flownav.navigation.kernel_settings import NavigatorSettings
 
 PARTS: dict[str, type[Any]] = {
     "filter": FilterSettings,
-    "imu": told.ImuSettings,
-    "gps": told.GpsSettings,
-    "flow": told.FlowSettings,
-    "height": told.HeightSettings,
-    "attitude": told.AttitudeSettings,
-    "place": told.PlaceSettings,
-    "aid": told.AidSettings,
-    "equipment": told.Equipment,
+    "imu": kernel_settings.ImuSettings,
+    "gps": kernel_settings.GpsSettings,
+    "flow": kernel_settings.FlowSettings,
+    "height": kernel_settings.HeightSettings,
+    "attitude": kernel_settings.AttitudeSettings,
+    "place": kernel_settings.PlaceSettings,
+    "aid": kernel_settings.AidSettings,
+    "equipment": kernel_settings.Equipment,
 }
 
 

@@ -12,6 +12,7 @@ from flownav.estimation.laws.still import pad_below, position_itself, velocity_i
 from flownav.estimation.named import Attitude, PositionNed, VelocityNed, rotation_by
 from flownav.estimation.states import MEASURED, PAD, STATE
 from flownav.navigation import calls
+from flownav.navigation.kernel_settings import PlaceSettings
 from flownav.navigation.memory import MEMORY
 from flownav.navigation.motion_records import ImuMemory, SeenWindow, StandMemory
 from flownav.navigation.offers import compare_level, conclude, fuse_offered, judged_whole, note_aid, note_height
@@ -27,7 +28,6 @@ from flownav.navigation.reasons import (
 )
 from flownav.navigation.records import AidMemory, LevelMemory, PadMemory, Reading, StartMemory
 from flownav.navigation.tape import PAD_FOUND, Output
-from flownav.navigation.told import PlaceSettings
 from flownav.navigation.verdicts import UNKNOWN_M, Event, Fate, Offer, Reset, on_lanes
 from flownav.navigation.windows import RESTING_FLOW_M_S, RESTING_GPS_M_S, flow_speed
 
@@ -39,7 +39,7 @@ LEAST_WHITE_SHARE = 0.02
 ON_GROUND = 0.5  # between 0 and 1
 FLOWN_S = 5.0  # chosen: a skid switch that bounces, or a detector that has not made up its mind, is no flight
 STANDING_SIGMA_M = 0.005  # chosen, not measured: how skids settle
-CARRIED_M = 0.1  # chosen, not measured; 0.05 m stays and 0.15 m goes along (test_fates)
+MOVED_ALONG_M = 0.1  # chosen, not measured; 0.05 m stays and 0.15 m goes along (test_fates)
 # how the pad is known: not, of a vehicle that flies and stood on none; it stands on it before its flight, has left it,
 # has seen it
 NEVER_STOOD, STOOD_ON, LEFT, SEEN = -1.0, 1.0, 2.0, 3.0
@@ -128,11 +128,11 @@ def judge_pad(reading: Reading, component: int, started: float, s: PlaceSettings
     sigma = (s.pad_distance_sigma if component == 2 else s.pad_angle_sigma_rad) * distance
     sight = 1.0 + reading.value_0 * reading.value_0 + reading.value_1 * reading.value_1
     across = distance * distance / (sight * (1.0 + value * value))
-    told = stated if component == 2 else stated * across
+    variance_stated = stated if component == 2 else stated * across
     reason = usable_in_flight(reading, reading.value_0 + reading.value_1 + distance, 0.0, started)
     near = distance < LEAST_PAD_DISTANCE_M
     lasts = (s.pad_scale_sigma if component == 2 else s.pad_boresight_sigma_rad) * distance
-    whole = told if np.isfinite(stated) else sigma * sigma
+    whole = variance_stated if np.isfinite(stated) else sigma * sigma
     white = larger(whole - lasts * lasts, LEAST_WHITE_SHARE * whole)
     return OUT_OF_RANGE if reason == FUSED and near else reason, white
 
@@ -283,8 +283,8 @@ def stand_on_pad(
     sound = usable(reading, reading.value_0, 0.0, start.started) == FUSED
     landed = sound and reading.value_0 > ON_GROUND
     off_n, off_e = pad.north_m - position.pos_n, pad.east_m - position.pos_e
-    carried = m.known == STOOD_ON and off_n * off_n + off_e * off_e > CARRIED_M * CARRIED_M
-    anew = landed and (m.known == 0.0 or carried)
+    moved_along = m.known == STOOD_ON and off_n * off_n + off_e * off_e > MOVED_ALONG_M * MOVED_ALONG_M
+    anew = landed and (m.known == 0.0 or moved_along)
     known = STOOD_ON if anew else m.known
     flies = sound and not landed
     aloft_s = np.inf if landed else (t_s if flies and t_s < m.aloft_s else m.aloft_s)

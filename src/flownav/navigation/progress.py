@@ -12,16 +12,16 @@ from flownav.core.compile import ONE_LANE, Layout, Work, equation, procedure, re
 from flownav.core.measurement import Array, Sensor
 from flownav.estimation.states import HYPOTHESES
 from flownav.navigation import waiting, waiting_records
+from flownav.navigation.kernel_settings import Equipment
 from flownav.navigation.memory import OWN_FILTER, WORK_ROWS, new_work
 from flownav.navigation.packed import START_SIGMA, load_equipment
-from flownav.navigation.told import Equipment
 from flownav.navigation.waiting import load_queue, store_queue, wait
 from flownav.navigation.waiting_records import Arrival
 
 # what is returned of a reading, and of the state of now
 TAKEN, LATE, OVERFLOW, NOT_FINITE = waiting.TAKEN, waiting.LATE, waiting.OVERFLOW, waiting.NOT_FINITE
 NOT_BELIEVED, BEGUN_ANEW, NO_SENSOR = 4, 5, 6
-TOLD, NOT_STARTED, BEHIND, STALE = 0, 1, 2, 3
+STATE_GIVEN, NOT_STARTED, BEHIND, STALE = 0, 1, 2, 3
 STATUSES = {
     "TAKEN": (TAKEN, "it was fed, or waits until everything of its instant must be here"),
     "LATE": (LATE, "readings of later instants were fed already: it was dropped"),
@@ -32,7 +32,7 @@ STATUSES = {
     "NO_SENSOR": (NO_SENSOR, "there is no sensor of this number: it was dropped"),
 }
 NOW_STATUSES = {
-    "TOLD": (TOLD, "the state is that of this instant"),
+    "TOLD": (STATE_GIVEN, "the state is that of this instant"),
     "NOT_STARTED": (NOT_STARTED, "the filter waits for an attitude and a fix, or for its deadline"),
     "BEHIND": (BEHIND, "the filter is on its way through a gap: ask again after the next readings"),
     "STALE": (STALE, "the filter's instant is more than 2 s before this one, or after it"),
@@ -160,12 +160,12 @@ def hear(work: Work, r: Work, p: Work, a: Arrival) -> int:
         by_wait = np.isfinite(stated_s) and np.isfinite(wait_s)
         store_progress(work, ONE_LANE, 0, with_deadline(m, deadline_s=a.t_s + wait_s if by_wait else stated_s))
     known = a.withheld == waiting_records.WITHHELD or a.withheld == waiting_records.SILENT
-    said = wait(r, with_withheld(a, withheld=a.withheld if known else waiting_records.AS_IS))
-    if said == TAKEN:
+    status = wait(r, with_withheld(a, withheld=a.withheld if known else waiting_records.AS_IS))
+    if status == TAKEN:
         q = load_queue(r, ONE_LANE, 0)
         if a.t_s > q.newest_s or not np.isfinite(q.newest_s):
             store_queue(r, ONE_LANE, 0, waiting.with_newest(q, newest_s=a.t_s))
-    return believed if said == TAKEN else said
+    return believed if status == TAKEN else status
 
 
 MOST_SENSOR = float(max(Sensor))

@@ -15,7 +15,7 @@ SILENT = -1  # no row for this component in this lane: there was no reading, or 
 
 
 @equation
-def is_heard(reading: Reading) -> bool:
+def is_received(reading: Reading) -> bool:
     """Whether a reading is there for a memory that only watches: it arrived, has data and is not withheld."""
     return reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
 

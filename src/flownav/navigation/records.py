@@ -79,7 +79,7 @@ class RangeMemory(NamedTuple):
     last_m: float = nan
     same_s: float = nan
     down_m: float = 0.0
-    said_s: float = nan
+    stuck_s: float = nan
     doubted: float = 0.0
     sigmas: float = 0.0
     off_m: float = 0.0
@@ -144,7 +144,7 @@ class FlowSum(NamedTuple):
     looked together [s], and the sums of their values and of their quality, each times its length.
     """
 
-    heard_s: float = -inf
+    received_s: float = -inf
     looked_s: float = 0.0
     x: float = 0.0
     y: float = 0.0
@@ -204,7 +204,7 @@ class NoiseMemory(NamedTuple):
 
     factor: float = 1.0
     before: float = 0.0
-    heard_s: float = -inf
+    received_s: float = -inf
     readings: float = 0.0
 
 
@@ -234,7 +234,7 @@ class GpsMemory(NamedTuple):
     back and forth added up.
     """
 
-    told_s: float = -inf
+    last_fix_s: float = -inf
     moved_n_m: float = 0.0
     moved_e_m: float = 0.0
 

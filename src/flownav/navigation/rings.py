@@ -102,10 +102,10 @@ class Rings:
     def take(self, given: Given) -> int:
         """Let a reading wait: TAKEN, or why not (`waiting`)."""
         self._at[:] = given.t_s, given.sensor
-        said = int(_take(self.rings, self._at, given.numbers))
-        if said == TAKEN:
+        status = int(_take(self.rings, self._at, given.numbers))
+        if status == TAKEN:
             self._arrival_s[int(self._queue.order) % ORDERS] = given.t_s
-        return said
+        return status
 
     def take_back(self, since_s: float) -> int:
         """Inertial readings from an instant on were of a sensor that errs; how many of them still waited."""
@@ -128,9 +128,9 @@ class Rings:
 
     def now(self, work: Array, settings: Array, t_s: float) -> NowRow[Array]:
         """The state of a navigator's work, carried on to an instant."""
-        _tell(work, self.rings, settings, t_s, self._now)
-        told: NowRow[Array] = now_row(self._now.copy())
-        return told
+        _fill_now(work, self.rings, settings, t_s, self._now)
+        row: NowRow[Array] = now_row(self._now.copy())
+        return row
 
     def inertial(self) -> Array:
         """The inertial readings that are here and no spikes, (n, 7): time, gyro, specific force; in order."""
@@ -204,6 +204,6 @@ def put_row(queue: EventQueue, k: int, a: Arrival) -> None:
 
 
 @kernel
-def _tell(work: Work, rings: Array, settings: Array, t_s: float, out: Array) -> None:
+def _fill_now(work: Work, rings: Array, settings: Array, t_s: float, out: Array) -> None:
     """The state of now."""
     tell_now(pointer(work), pointer(rings), pointer(settings), t_s, pointer(out))

@@ -25,7 +25,7 @@ from flownav.estimation.states import (
     VELOCITY,
     VELOCITY_LAG,
 )
-from flownav.navigation.told import (
+from flownav.navigation.kernel_settings import (
     NO_STATED_NOISE,
     AidSettings,
     AttitudeSettings,

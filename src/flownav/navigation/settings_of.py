@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 from flownav.core.frames import GRAVITY_M_S2
 from flownav.core.parameter_files import check
+from flownav.navigation.kernel_settings import NO_STATED_NOISE, FlowNoise
 from flownav.navigation.notch import LEAST_NOTCH_HZ, WIDTH, read_angle
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
 from flownav.sensors.barometer import BarometerSheet
 from flownav.sensors.camera_sheets import FlowCameraSheet, PadCameraSheet
 from flownav.sensors.datasheet import FlowSensor, identified_flow, needs_lag_states
@@ -44,7 +44,7 @@ CLIMB_M_S = 1.0  # chosen: a lag errs by its length in a descent at this speed
 Keys = dict[str, float]
 
 
-class Told(NamedTuple):
+class GivenSettings(NamedTuple):
     """A navigator's settings, and the flow's noise by its sensor file, where that is to be used."""
 
     settings: NavigatorSettingsFile
@@ -63,7 +63,7 @@ def settings_of(
     stated: NavigatorSettingsFile | None = None,
     flow_noise_stated: bool = False,
     rotor_hz: tuple[float, float] | None = None,
-) -> Told:
+) -> GivenSettings:
     """The navigator's settings for these sensors.
 
     flow: the flow sensor's file, else the sheets'. stated: a user's own settings; the keys that stand in it are kept.
@@ -81,7 +81,7 @@ def settings_of(
         keys |= {name: getattr(stated, name) for name in stated.model_fields_set}
     noise = noise_of(sensor) if sensor is not None and flow_noise_stated else NO_STATED_NOISE
     where = sensor.name if sensor is not None else "the sensor files"
-    return Told(check(keys, NavigatorSettingsFile, f"{where}, as the navigator takes it"), noise)
+    return GivenSettings(check(keys, NavigatorSettingsFile, f"{where}, as the navigator takes it"), noise)
 
 
 def of_sheets(sheets: SensorSheets, rotor_hz: tuple[float, float] | None = None) -> Keys:

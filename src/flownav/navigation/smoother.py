@@ -33,6 +33,7 @@ from flownav.navigation.entries import (
     view_prediction,
     view_reset,
 )
+from flownav.navigation.kernel_settings import carries_lag
 from flownav.navigation.loop import Running, run
 from flownav.navigation.memory import SCALE_DOUBT, new_work, store_start
 from flownav.navigation.records import StartMemory
@@ -47,7 +48,6 @@ from flownav.navigation.tape import (
     room_of,
     write_estimate,
 )
-from flownav.navigation.told import carries_lag
 
 EVENTS_AT_ONCE = 2048  # events
 
@@ -72,7 +72,7 @@ def smooth(queue: EventQueue, running: Running, chunk: int = EVENTS_AT_ONCE) -> 
     The rows are those of the tape's estimate, at the same instants. No state is merely considered in this run: what
     goes back over a correction is that of the gain P h'/S. The tape is left as such a run leaves it.
     """
-    if carries_lag(running.told.flow):
+    if carries_lag(running.given.flow):
         raise InputError("the smoother knows no flow sensor's dynamics; it needs settings of flow_lag_c_1_s2 = 0")
     running.work[CONSIDERS] = 0.0
     chunks = [part_of(queue, first, first + chunk) for first in range(0, len(queue.t_s), chunk)]
@@ -88,7 +88,7 @@ def smooth(queue: EventQueue, running: Running, chunk: int = EVENTS_AT_ONCE) -> 
     for part, before, after in zip(chunks[::-1], marks[-2::-1], marks[:0:-1], strict=True):
         tape = _repeated(part, running, before, after)
         estimates = tape.estimate[before.used[ESTIMATES] : after.used[ESTIMATES], 0, 0]
-        _go_back(tape, estimates, running.told.filter, later, work, found)
+        _go_back(tape, estimates, running.given.filter, later, work, found)
     running.work[:], running.tape.used[:] = marks[-1]
     return found.estimates()[::-1].copy()
 
@@ -112,15 +112,15 @@ def _repeated(part: EventQueue, running: Running, before: Mark, after: Mark) -> 
     return tape
 
 
-def _go_back(tape: Tape, t_s: Array, told: FilterSettings, later: Backward, work: Array, found: Tape) -> None:
+def _go_back(tape: Tape, t_s: Array, given: FilterSettings, later: Backward, work: Array, found: Tape) -> None:
     """Backward through a tape's journal; each of its estimates, the last first, smoothed onto the tape `found`."""
     estimate = found.estimate.reshape(-1)
-    go_back(tape.journal, np.ascontiguousarray(t_s), told, later, work, estimate, room_of(found), found.used)
+    go_back(tape.journal, np.ascontiguousarray(t_s), given, later, work, estimate, room_of(found), found.used)
 
 
 @kernel
 def go_back(
-    journal: Journal, t_s: Array, told: FilterSettings, later: Backward, work: Array, found: Array,
+    journal: Journal, t_s: Array, given: FilterSettings, later: Backward, work: Array, found: Array,
     room: NDArray[np.int64], used: NDArray[np.int64],
 ) -> None:  # fmt: skip
     """Backward through a journal, lambda and Lambda with it; t_s: the instants of its estimates."""
@@ -135,7 +135,7 @@ def go_back(
             p = view_prediction(line)
             back_over_prediction(vector, matrix, p.dt_s, p.middle, p.force_ned_m_s2)
         elif kind == DECAYED:
-            back_over_decay(vector, matrix, view_decay(line).dt_s, told)
+            back_over_decay(vector, matrix, view_decay(line).dt_s, given)
         elif kind == CORRECTED:
             c = view_correction(line)
             back_over_correction(vector, matrix, c.jacobian, c.gain, c.innovation, c.variance)

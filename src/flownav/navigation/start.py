@@ -15,16 +15,16 @@ from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, MOST_HYPOTHESES, POS
 from flownav.navigation import calls
 from flownav.navigation.before_start import waits
 from flownav.navigation.course import with_sought
+from flownav.navigation.kernel_settings import FROM_MAG, FROM_YAW, NO_HEADING, Equipment
 from flownav.navigation.lagged_flow import start_lag
 from flownav.navigation.memory import MEMORY
 from flownav.navigation.motion_records import SteadyForce
 from flownav.navigation.offers import with_aid
 from flownav.navigation.packed import START_SIGMA, load_filter_settings, load_flow_settings, load_imu_settings
 from flownav.navigation.place import ON_GROUND
-from flownav.navigation.reasons import is_heard
+from flownav.navigation.reasons import is_received
 from flownav.navigation.records import AidMemory, HeadingMemory, Reading, ScaleDoubt, StartMemory
 from flownav.navigation.tape import START, Output
-from flownav.navigation.told import FROM_MAG, FROM_YAW, NO_HEADING, Equipment
 from flownav.navigation.verdicts import Biases, Event, Force, on_lanes
 
 # All chosen for any small vehicle, none fitted to a log; what no test is named beside is not measured.
@@ -37,7 +37,7 @@ READ_HEADING_RAD = 0.1  # an autopilot's, whose compass is calibrated: outdoor's
 UNKNOWN_RAD = 1.5  # one that is to be found from the course: any of half a turn
 COMPASS_HEADING_RAD = 0.3  # a raw magnetometer's: twice the usual hard iron (compass_sigma_rad)
 DATUM_HEADING_RAD = 1e-3  # the start defines the frame
-UNTOLD_HEADING_RAD = 1.0  # the first external heading ends it, 0.5 rad off (test_an_external_heading_is_taken)
+UNSTATED_HEADING_RAD = 1.0  # the first external heading ends it, 0.5 rad off (test_an_external_heading_is_taken)
 LEAST_LEVELLING = 5.0  # readings whose mean is level: 0.1 s at 50 Hz
 # so sure a mean will do (0.6 deg); a shaken vehicle's is waited for
 LEVELLED_M_S2, LEVELLING_S = 0.1, 1.0
@@ -83,7 +83,7 @@ def runs(m: StartMemory) -> bool:
 def has_fix(reading: Reading, sensor: int) -> bool:
     """Whether a fix is at hand."""
     finite = bool(np.isfinite(reading.value_0 + reading.value_1 + reading.value_2))
-    return sensor == Sensor.GPS_POSITION and is_heard(reading) and finite
+    return sensor == Sensor.GPS_POSITION and is_received(reading) and finite
 
 
 @equation
@@ -96,8 +96,8 @@ def starts(reading: Reading, m: StartMemory, t_s: float, sensor: int, deadline_s
     waiting = m.started == 0.0 and (bool(np.isfinite(m.attitude_s)) or levels)
     other = sensor == Sensor.FLOW_RATE or sensor == Sensor.FLOW_VELOCITY or sensor == Sensor.POSE
     stands = sensor == Sensor.LANDED and reading.value_0 > ON_GROUND
-    heard = is_heard(reading) and bool(np.isfinite(reading.value_0))
-    return waiting and (has_fix(reading, sensor) or (heard and (other or stands) and t_s >= deadline_s))
+    heading_here = is_received(reading) and bool(np.isfinite(reading.value_0))
+    return waiting and (has_fix(reading, sensor) or (heading_here and (other or stands) and t_s >= deadline_s))
 
 
 @on_lanes(calls.any_starts)
@@ -132,7 +132,7 @@ class FirstState(NamedTuple):
     level: Levelling
     position_variance: float
     heading_variance: float
-    untold_scale: bool
+    scale_unstated: bool
     steady: SteadyForce
 
 
@@ -157,7 +157,7 @@ def begin(work: Work, lanes: Lanes, lane: int, first: FirstState, p: Work) -> No
     tie_tilt(work, lanes, lane, rotation_by(first.attitude), level.shared)
     for fault in range(MOST_HYPOTHESES):
         begin_lane_anew(work, lanes, states_of(lanes), fault, lane)
-    doubted = load_filter_settings(p).flow_scale_sigma if first.untold_scale else 0.0
+    doubted = load_filter_settings(p).flow_scale_sigma if first.scale_unstated else 0.0
     store_doubt(work, lanes, lane, ScaleDoubt(doubted))
 
 
@@ -206,8 +206,8 @@ def heading_sigma(read: bool, lost: bool, unknown: bool, field_rad: float, headi
     known = heading == NO_HEADING and not lost
     turned = DATUM_HEADING_RAD if known else (READ_HEADING_RAD if read else COMPASS_HEADING_RAD)
     turned = UNKNOWN_RAD if unknown else turned
-    told = heading == FROM_YAW or (heading == FROM_MAG and not read)
-    return UNTOLD_HEADING_RAD if told and not np.isfinite(field_rad) else turned
+    is_stated = heading == FROM_YAW or (heading == FROM_MAG and not read)
+    return UNSTATED_HEADING_RAD if is_stated and not np.isfinite(field_rad) else turned
 
 
 class Beginning(NamedTuple):
@@ -217,7 +217,7 @@ class Beginning(NamedTuple):
     start: StartMemory
     aid: AidMemory
     heading: HeadingMemory
-    told: Event
+    event: Event
 
 
 @on_lanes(calls.start_lanes)
@@ -281,6 +281,6 @@ def level(m: StartMemory, believed: float, field_rad: float, fitted: Equipment) 
     """
     roll = believed * arctan2(-m.force_y, -m.force_z)
     pitch = believed * arctan2(m.force_x, np.sqrt(m.force_y * m.force_y + m.force_z * m.force_z))
-    heard = (fitted.heading == FROM_MAG or fitted.heading == FROM_YAW) and bool(np.isfinite(field_rad))
+    heading_here = (fitted.heading == FROM_MAG or fitted.heading == FROM_YAW) and bool(np.isfinite(field_rad))
     north_rad = fitted.declination_rad if fitted.heading == FROM_MAG else 0.0
-    return quaternion_from_euler(roll, pitch, north_rad - field_rad if heard else 0.0)
+    return quaternion_from_euler(roll, pitch, north_rad - field_rad if heading_here else 0.0)

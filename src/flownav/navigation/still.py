@@ -16,6 +16,7 @@ from flownav.estimation.covariance import consider_none
 from flownav.estimation.laws.still import gyro_at_rest, velocity_itself
 from flownav.estimation.states import ACCEL_BIAS, GYRO_BIAS, VELOCITY
 from flownav.navigation import calls
+from flownav.navigation.kernel_settings import PlaceSettings
 from flownav.navigation.memory import HOLD_CLOCK, STILL_CLOCK, share, shared
 from flownav.navigation.motion_records import ImuMemory, ImuWindow, SeenWindow, StandMemory
 from flownav.navigation.offers import fuse_offered, note_aid
@@ -23,7 +24,6 @@ from flownav.navigation.packed import load_place_settings
 from flownav.navigation.reasons import FUSED, SILENT
 from flownav.navigation.records import StartMemory
 from flownav.navigation.tape import STOOD, Output
-from flownav.navigation.told import PlaceSettings
 from flownav.navigation.usual import assume_usual
 from flownav.navigation.verdicts import Anywhere, AxisBias, AxisVelocity, Doubt, Event, Offer, on_lanes
 from flownav.navigation.vibration import DOUBT_M_S2, with_doubt
@@ -166,7 +166,7 @@ def stand_turning(windows: float, axis: int) -> float:
     return rate * rate / (2.0 * windows - 1.0)
 
 
-class Taught(NamedTuple):
+class Learnt(NamedTuple):
     """A gyro's bias that is opened, and its offer."""
 
     opened: Doubt
@@ -176,7 +176,7 @@ class Taught(NamedTuple):
 @on_lanes(calls.offer_bias)
 def offer_bias(
     start: StartMemory, gyro: ImuWindow, seen: SeenWindow, m: StandMemory, bias: AxisBias, *, axis: int
-) -> Taught:
+) -> Learnt:
     """The gyro's mean is its bias: of one whose motors run only where it touches the ground for certain.
 
     At rest nothing else turns a gyro: a bias that the gate would not let be it, is opened to it.
@@ -188,7 +188,7 @@ def offer_bias(
     variance = square / larger(gyro.readings, 1.0) + least
     off = squared(mean - bias.rad_s)
     beyond = off > squared(BELIEVED_SIGMAS) * (bias.variance + variance)
-    return Taught(
+    return Learnt(
         Doubt(GYRO_BIAS + axis, off if teaches and resting and beyond else 0.0),
         Offer(mean, variance, FUSED if teaches else SILENT),
     )

@@ -38,28 +38,28 @@ def written_on(tape: Tape, lane: int = 0) -> Written:
 
 def estimate_table(rows: Array) -> Table:
     """Rows of a tape's estimate: position, body velocity, attitude, standard deviations, protection levels."""
-    said = EstimateRow.of(rows)
-    followed = bool(np.isfinite(said.protection_m).any())  # a smoother has none
+    row = EstimateRow.of(rows)
+    followed = bool(np.isfinite(row.protection_m).any())  # a smoother has none
     return {
-        "t_s": said.t_s,
-        **_named(POSITION_NED, said.pos_ned_m),
-        **_named(VELOCITY_BODY, said.vel_frd_m_s),
-        **_named(QUATERNION, said.quaternion),
-        **_named(_stds(POSITION_NED), said.std_pos_ned_m),
-        **_named(_stds(VELOCITY_BODY), said.std_vel_frd_m_s),
-        **(_named(PROTECTION_LEVELS, said.protection_m) if followed else {}),
+        "t_s": row.t_s,
+        **_named(POSITION_NED, row.pos_ned_m),
+        **_named(VELOCITY_BODY, row.vel_frd_m_s),
+        **_named(QUATERNION, row.quaternion),
+        **_named(_stds(POSITION_NED), row.std_pos_ned_m),
+        **_named(_stds(VELOCITY_BODY), row.std_vel_frd_m_s),
+        **(_named(PROTECTION_LEVELS, row.protection_m) if followed else {}),
     }
 
 
 def states_table(rows: Array) -> Table:
     """The rest of the same rows: every other state with its standard deviation."""
-    said = EstimateRow.of(rows)
+    row = EstimateRow.of(rows)
     return {
-        "t_s": said.t_s,
-        **_named(VELOCITY_NED, said.vel_ned_m_s),
-        **_named(_stds(TILTS), said.std_tilt_ned_rad),
-        **_named(FILTER_STATES, said.states),
-        **_named(_stds(FILTER_STATES), said.std_states),
+        "t_s": row.t_s,
+        **_named(VELOCITY_NED, row.vel_ned_m_s),
+        **_named(_stds(TILTS), row.std_tilt_ned_rad),
+        **_named(FILTER_STATES, row.states),
+        **_named(_stds(FILTER_STATES), row.std_states),
     }
 
 

@@ -27,6 +27,7 @@ from flownav.navigation.heading import take_heading
 from flownav.navigation.height import take_range
 from flownav.navigation.inertial import judge_motion, keep_imu, steady_force, watch_force
 from flownav.navigation.journal import note_decay, note_estimate, note_prediction, reset_state
+from flownav.navigation.kernel_settings import FROM_MAG, NO_HEADING, Equipment
 from flownav.navigation.lagged_flow import flow_lag
 from flownav.navigation.memory import (
     CLOCK,
@@ -54,7 +55,6 @@ from flownav.navigation.start import runs, try_start
 from flownav.navigation.still import stand_still
 from flownav.navigation.suspicion import mind_faults
 from flownav.navigation.tape import ESTIMATE_PERIOD_S, Output, output_of, write_estimate
-from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
 from flownav.navigation.vibration import add_vibration_noise, limit_biases
 from flownav.navigation.windows import watch_gps_velocity, watch_imu, watch_range
 
@@ -84,13 +84,13 @@ def navigate(work: Work, lanes: Lanes, p: Work, o: Output, t_s: float, sensor: i
 @equation
 def receive(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p: Work, o: Output) -> None:
     """Process a reading for the time before it: drop it if it is a spike, and find the motion up to its instant."""
-    heard = sensor == Sensor.IMU and fitted.use_imu
+    inertial_here = sensor == Sensor.IMU and fitted.use_imu
     gather(work, lanes, t_s, sensor)
     if runs(work, lanes):
-        if heard:
+        if inertial_here:
             drop_spikes(work, lanes, t_s, o)
         step_s = t_s - shared(work, lanes, CLOCK)
-        judge_motion(work, lanes, t_s, step_s=step_s, heard=heard, s=load_imu_settings(p), o=o)
+        judge_motion(work, lanes, t_s, step_s=step_s, arrived_now=inertial_here, s=load_imu_settings(p), o=o)
 
 
 @equation

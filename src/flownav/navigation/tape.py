@@ -186,10 +186,10 @@ def write_offer(work: Work, lanes: Lanes, t_s: float, sensor: int, component: in
     row = o.used[OFFERED_ROWS]
     if row >= o.room[1]:
         return
-    said = False
+    judged = False
     for lane in range(len(lanes)):
-        said = said or work[REASON * len(lanes) + lane] != SILENT
-    if not said:
+        judged = judged or work[REASON * len(lanes) + lane] != SILENT
+    if not judged:
         return
     o.used[OFFERED_ROWS] = row + 1
     for lane in range(len(lanes)):

@@ -128,7 +128,7 @@ def followed_noise(
 
     What lasts there is of the motion, or an error that the filter carries as a state.
     """
-    step_s = t_s - m.heard_s
+    step_s = t_s - m.received_s
     limit = gate_sigma * np.sqrt(2.0 * total)
     change = clamp(innovation - m.before, -limit, limit)
     share = 0.0 if step_s > LONGEST_BLOCK_S else larger(step_s / NOISE_TIME_S, 1.0 / (FIRST_READINGS + m.readings))

@@ -16,12 +16,12 @@ from flownav.navigation.waiting import (
     load_own_gyro,
     load_queue,
     load_sizes,
-    load_told,
+    load_stated_attitude,
     ring_row,
     store_own_gyro,
     taken_out,
 )
-from flownav.navigation.waiting_records import FLOW_RATE, Arrival, Inertial, OwnGyro, Queue, Sizes, Told
+from flownav.navigation.waiting_records import FLOW_RATE, Arrival, Inertial, OwnGyro, Queue, Sizes, StatedAttitude
 
 MOST_OWN = 300.0  # readings over which a flow sensor's own gyro is compared, 30 s of 10 Hz: chosen
 LEAST_SINE = 1e-12  # of half a turn: less is as its own sine
@@ -57,8 +57,8 @@ def with_turning(r: Work, p: Work, a: Arrival) -> Arrival:
     elif q.attitudes > 1.0:
         spare = rates_by_attitude(r, s, q, begin_s, a.end_s)
     if load_equipment(p).flow_gyro_is_imu:
-        heard, turning = beside(load_own_gyro(r, ONE_LANE, 0), a.value_2, a.value_3, turning)
-        store_own_gyro(r, ONE_LANE, 0, heard)
+        gyro, turning = beside(load_own_gyro(r, ONE_LANE, 0), a.value_2, a.value_3, turning)
+        store_own_gyro(r, ONE_LANE, 0, gyro)
     return with_turned(
         a,
         value_2=a.value_2 if np.isfinite(a.value_2) else spare[0],
@@ -157,7 +157,7 @@ def mean_rates(r: Work, s: Sizes, q: Queue, place: int, begin_s: float, end_s: f
 
 # -- by attitudes -------------------------------------------------------------------------------------------
 @equation
-def attitude_between(at_s: float, one: Told, then: Told, before: Told) -> Told:
+def attitude_between(at_s: float, one: StatedAttitude, then: StatedAttitude, before: StatedAttitude) -> StatedAttitude:
     """The attitude at an instant, linear between both, held after the later; before: what was found of those before."""
     here = one.t_s <= at_s and at_s < then.t_s
     after = at_s >= then.t_s
@@ -165,7 +165,7 @@ def attitude_between(at_s: float, one: Told, then: Told, before: Told) -> Told:
     same = share_s == 0.0
     w, x = (then.qw - one.qw) / step_s * share_s + one.qw, (then.qx - one.qx) / step_s * share_s + one.qx
     y, z = (then.qy - one.qy) / step_s * share_s + one.qy, (then.qz - one.qz) / step_s * share_s + one.qz
-    return Told(
+    return StatedAttitude(
         at_s,
         then.qw if after else ((one.qw if same else w) if here else before.qw),
         then.qx if after else ((one.qx if same else x) if here else before.qx),
@@ -175,15 +175,15 @@ def attitude_between(at_s: float, one: Told, then: Told, before: Told) -> Told:
 
 
 @equation
-def as_before(before: Told, now: Told) -> Told:
+def as_before(before: StatedAttitude, now: StatedAttitude) -> StatedAttitude:
     """An attitude by that quaternion of the two that it has which is nearer to the one before."""
     product = before.qw * now.qw + before.qx * now.qx + before.qy * now.qy + before.qz * now.qz
     sign = -1.0 if product < 0.0 else 1.0
-    return Told(now.t_s, sign * now.qw, sign * now.qx, sign * now.qy, sign * now.qz)
+    return StatedAttitude(now.t_s, sign * now.qw, sign * now.qx, sign * now.qy, sign * now.qz)
 
 
 @equation
-def unit(a: Told) -> tuple[float, float, float, float]:
+def unit(a: StatedAttitude) -> tuple[float, float, float, float]:
     """Its quaternion, of unit length."""
     size = np.sqrt(a.qw * a.qw + a.qx * a.qx + a.qy * a.qy + a.qz * a.qz)
     return a.qw / size, a.qx / size, a.qy / size, a.qz / size
@@ -195,10 +195,10 @@ def rates_by_attitude(r: Work, s: Sizes, q: Queue, begin_s: float, end_s: float)
 
     The rotation is conj(q0) q1; its vector part is half the turn for the small turns between.
     """
-    last = load_told(r, ONE_LANE, attitude_row(s, q.attitude_first, 0), 0)
+    last = load_stated_attitude(r, ONE_LANE, attitude_row(s, q.attitude_first, 0), 0)
     begun, ended = last, last
     for k in range(1, int(q.attitudes)):
-        now = as_before(last, load_told(r, ONE_LANE, attitude_row(s, q.attitude_first, k), 0))
+        now = as_before(last, load_stated_attitude(r, ONE_LANE, attitude_row(s, q.attitude_first, k), 0))
         begun = attitude_between(begin_s, last, now, begun)
         ended = attitude_between(end_s, last, now, ended)
         last = now

@@ -12,10 +12,10 @@ import numpy as np
 from flownav.core.compile import clamp, equation, larger, replacing, smaller, squared
 from flownav.estimation.states import ACCEL_BIAS, GROUND, POSITION, VELOCITY
 from flownav.navigation import calls
+from flownav.navigation.kernel_settings import ImuSettings
 from flownav.navigation.motion_records import ForceBlocks, ImuMemory, MotionStep
 from flownav.navigation.records import Reading, StartMemory
 from flownav.navigation.tape import IMU_DOUBTED
-from flownav.navigation.told import ImuSettings
 from flownav.navigation.trust import AccelFactors
 from flownav.navigation.verdicts import Biases, Doubt, Event, on_lanes
 

@@ -25,8 +25,8 @@ from flownav.navigation.waiting_records import (
     OwnGyro,
     Queue,
     Sizes,
+    StatedAttitude,
     Stored,
-    Told,
     arrived,
     order_of,
     stored,
@@ -50,8 +50,8 @@ _load_spike, _store_spike = RINGS.access(SpikeMemory)
 load_own_gyro, store_own_gyro = RINGS.access(OwnGyro)
 load_inertial, _store_inertial = lane_access(Inertial, None)
 _load_stored, _store_stored = lane_access(Stored, None)
-load_told, _store_told = lane_access(Told, None)
-INERTIAL, STORED, TOLD = len(Inertial._fields), len(Stored._fields), len(Told._fields)
+load_stated_attitude, _store_stated_attitude = lane_access(StatedAttitude, None)
+INERTIAL, STORED, ATTITUDE_FIELDS = len(Inertial._fields), len(Stored._fields), len(StatedAttitude._fields)
 NO_MEMORY, NOTHING_KEPT, NO_SPIKE, NO_GYRO = ImuMemory(), Kept(), SpikeMemory(), OwnGyro()
 
 with_ring = replacing(Queue, "first", "count", "fed", "order")
@@ -65,7 +65,7 @@ _with_kept = replacing(ImuMemory, *Kept._fields)
 
 def rows_of(sizes: Sizes) -> int:
     """How many numbers the rings take."""
-    return FIRST_ROW + int(sizes.ring * INERTIAL + sizes.table * STORED + sizes.attitudes * TOLD)
+    return FIRST_ROW + int(sizes.ring * INERTIAL + sizes.table * STORED + sizes.attitudes * ATTITUDE_FIELDS)
 
 
 def new_rings(sizes: Sizes) -> Array:
@@ -114,7 +114,7 @@ def attitude_row(s: Sizes, first: float, place: int) -> int:
     at = int(first) + place
     around = int(s.attitudes)
     begin = FIRST_ROW + int(s.ring) * INERTIAL + int(s.table) * STORED
-    return begin + (at - around if at >= around else at) * TOLD
+    return begin + (at - around if at >= around else at) * ATTITUDE_FIELDS
 
 
 # -- in -----------------------------------------------------------------------------------------------------
@@ -195,8 +195,8 @@ def _keep_attitude(r: Work, s: Sizes, q: Queue, a: Arrival) -> Queue:
     after = q.attitude_first + 1.0
     first = (0.0 if after >= s.attitudes else after) if full else q.attitude_first
     count = q.attitudes if full else q.attitudes + 1.0
-    told = Told(a.t_s, a.value_0, a.value_1, a.value_2, a.value_3)
-    _store_told(r, ONE_LANE, attitude_row(s, first, int(count) - 1), 0, told)
+    attitude = StatedAttitude(a.t_s, a.value_0, a.value_1, a.value_2, a.value_3)
+    _store_stated_attitude(r, ONE_LANE, attitude_row(s, first, int(count) - 1), 0, attitude)
     return with_attitudes(q, attitude_first=first, attitudes=count)
 
 

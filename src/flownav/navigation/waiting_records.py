@@ -117,7 +117,7 @@ class Inertial(NamedTuple):
     accel_z: float
 
 
-class Told(NamedTuple):
+class StatedAttitude(NamedTuple):
     """An external attitude: its instant and quaternion, body to earth."""
 
     t_s: float

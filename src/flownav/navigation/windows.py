@@ -9,7 +9,7 @@ from flownav.estimation.laws import component
 from flownav.navigation import calls
 from flownav.navigation.inertial import sound
 from flownav.navigation.motion_records import ImuWindow, SeenWindow
-from flownav.navigation.reasons import is_heard
+from flownav.navigation.reasons import is_received
 from flownav.navigation.records import Look, Reading
 from flownav.navigation.verdicts import on_lanes
 
@@ -157,7 +157,7 @@ def watch_imu(reading: Reading, m: ImuWindow) -> ImuWindow:
 @on_lanes(calls.watch_range)
 def watch_range(reading: Reading, m: SeenWindow) -> SeenWindow:
     """A range goes into the window, whatever the filter makes of it; many sensors report 0 for no data."""
-    ranged = is_heard(reading) and reading.value_0 > 0.0 and np.isfinite(reading.value_0)
+    ranged = is_received(reading) and reading.value_0 > 0.0 and np.isfinite(reading.value_0)
     return with_range(reading.value_0, m) if ranged else m
 
 
@@ -165,8 +165,8 @@ def watch_range(reading: Reading, m: SeenWindow) -> SeenWindow:
 def watch_gps_velocity(reading: Reading, m: SeenWindow) -> SeenWindow:
     """The fastest level velocity of a receiver stays in the window."""
     speed_m_s = np.sqrt(squared(reading.value_0) + squared(reading.value_1))
-    told = is_heard(reading) and np.isfinite(speed_m_s)
-    return with_gps(m, gps_m_s=larger(m.gps_m_s, speed_m_s)) if told else m
+    is_stated = is_received(reading) and np.isfinite(speed_m_s)
+    return with_gps(m, gps_m_s=larger(m.gps_m_s, speed_m_s)) if is_stated else m
 
 
 @on_lanes(calls.watch_flow)
@@ -179,4 +179,4 @@ def watch_flow(reading: Reading, look: Look, m: SeenWindow, *, angular: bool) ->
     summed = with_flow(
         m, flow_u_m_s=m.flow_u_m_s + x * per, flow_v_m_s=m.flow_v_m_s + y * per, flows=m.flows + 1.0
     )  # fmt: skip
-    return summed if is_heard(reading) and np.isfinite(x + y) else m
+    return summed if is_received(reading) and np.isfinite(x + y) else m

@@ -76,7 +76,7 @@ def orders(laboratory: Laboratory) -> list[Panel]:
         "xaxis": {"tickvals": list(range(5)), "ticktext": list(ORDER_NAMES), "range": [-0.3, 4.3]},
         "yaxis": {"range": [50, 95]},
     }
-    for kind, said in (
+    for kind, about in (
         ("swing", "Seven runs a height, mean. A swing is one tone: every order fits it alike."),
         ("chirp", "One run a height, 0.3 to 4 Hz: here orders differ."),
     ):
@@ -85,7 +85,7 @@ def orders(laboratory: Laboratory) -> list[Panel]:
             name, colour = f"{t.height_m:.1f} m", figures_rig.HEIGHT_COLOURS[t.height_m]
             traces.append(figures_rig.line(name, colour, list(t.fits), list(t.fits.values()), markers=True))
         figure = figures_rig.figure(traces, "order of the model", "fit (%)", 340, **axes)
-        panels.append(Panel(f"orders-{kind}", title, said, f"{title}. {said}", figure))
+        panels.append(Panel(f"orders-{kind}", title, about, f"{title}. {about}", figure))
     return panels
 
 

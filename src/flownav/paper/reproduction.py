@@ -38,8 +38,8 @@ class Reproduction:
 
     def with_flights(self, other: Reproduction) -> Reproduction:
         """This one with the flights of another."""
-        tables, said = (*self.tables, *other.tables), (*self.findings, *other.findings)
-        return replace(self, tables=tables, flights=other.flights, findings=said)
+        tables, sentences = (*self.tables, *other.tables), (*self.findings, *other.findings)
+        return replace(self, tables=tables, flights=other.flights, findings=sentences)
 
     def as_json(self) -> dict[str, Any]:
         """The command's JSON: table1 to table6 as far as asked for, and more beside them."""
@@ -126,22 +126,22 @@ def reproduce(
     on_flight: Callable[[int], object] = lambda flown: None,
 ) -> Reproduction:
     """Run the rig, identify, fly and judge, as far as these tables need it."""
-    of, said = None, []
+    of, sentences = None, []
     more: dict[str, list[ErrorRow]] = {}
     if set(tables) & set(RIG_TABLES):
         of = laboratory.swing(seed, 1 in tables, on_run)
-        said += findings.of_laboratory(of) if 1 in tables else []
+        sentences += findings.of_laboratory(of) if 1 in tables else []
         validation = laboratory.table_2(of, lambda run, _: run.dynamics)
         if 2 in tables:
             printed = {(row.height_m, row.model): row for row in published.table_1()}
             more["table_2"] = validation
             more["table_2_published_models"] = laboratory.table_2(of, lambda run, model: printed[run.height_m, model])
-            said += findings.of_table_2(validation)
+            sentences += findings.of_table_2(validation)
         if 3 in tables:
             more["table_3"] = laboratory.table_3(of)
             more["table_3_published_model"] = laboratory.table_3(of, published.selected_model())
-            said += findings.of_table_3(more["table_3"], validation)
+            sentences += findings.of_table_3(more["table_3"], validation)
     flown = tuple(fly_table(table, seed, flights, on_flight) for table in FLIGHT_TABLES if table in tables)
     for of_table in flown:
-        said += findings.of_flights(of_table)
-    return Reproduction(tables, seed, of, flights=flown, findings=tuple(said), **more)
+        sentences += findings.of_flights(of_table)
+    return Reproduction(tables, seed, of, flights=flown, findings=tuple(sentences), **more)

@@ -28,29 +28,29 @@ def facts(of: Reproduction) -> list[tuple[str, str]]:
 
 def summary(of: Reproduction) -> str:
     """The verdict in sentences."""
-    said = []
+    sentences = []
     laboratory = of.laboratory
     if laboratory is not None and 1 in of.tables:
         off = {height: laboratory.mean_fit(height) - fit for height, fit in RELATION_FITS.items()}
         within = sum(abs(points) <= FIT_TOLERANCE for points in off.values())
         worst = max(off, key=lambda height: abs(off[height]))
-        said.append(
+        sentences.append(
             f"With one configuration of the rig the fits lie within {FIT_TOLERANCE:.0f} points of the paper's at "
             f"{within} of {len(off)} heights; the farthest is {number(off[worst], 1)} points off, at {worst:.1f} m."
         )
     for flown in of.flights:
         largest, honest = flown.scores["max_position_error_m"]["median"], flown.honest["max_position_error_m"]["median"]
-        said.append(
+        sentences.append(
             f"At {flown.what} the largest position error of the median flight is {largest:.3f} m "
             f"(the paper: {flown.published['max_position_error_m']:.3f} m); with the receiver of its Table 4 "
             f"it is {honest:.1f} m."
         )
     agree = sum(finding.agrees for finding in of.findings)
-    said.append(
+    sentences.append(
         f"Of {len(of.findings)} claims put to the test, {agree} come out as printed and {len(of.findings) - agree} do "
         "not."
     )
-    return kept_together(" ".join(said))
+    return kept_together(" ".join(sentences))
 
 
 def tiles(of: Reproduction) -> list[Tile]:
@@ -147,13 +147,13 @@ def leaking(flown: Flights) -> str:
 def _touchdown(flown: Flights) -> str:
     landed = flown.scores["touchdown"]
     largest, percentile = flown.scores["max_position_error_m"], flown.percentile["max_position_error_m"]
-    said = (
+    sentences = (
         f"Largest position error {_range(largest, 3)} m; the paper's {flown.published['max_position_error_m']:.4f} m "
         f"lies at percentile {percentile:.0f} of our flights."
     )
     if landed and landed["contact"]["distance_m"]:
-        said += f" Touchdown {_range(landed['contact']['distance_m'], 3)} m from the pad's centre."
-    return said
+        sentences += f" Touchdown {_range(landed['contact']['distance_m'], 3)} m from the pad's centre."
+    return sentences
 
 
 class Spread(NamedTuple):

@@ -6,18 +6,20 @@ from flownav.parts.protocols import (
     Estimate,
     Filter,
     Flown,
+    GivenSettings,
     Imu,
     Innovation,
     Outputs,
     Parts,
     Reading,
     SensorModel,
-    Told,
     Truth,
     Values,
     VehicleModel,
 )
 from flownav.vehicle.state import Around, Controls
+
+Told = GivenSettings  # its earlier name
 
 __all__ = [
     "Around",
@@ -26,6 +28,7 @@ __all__ = [
     "Estimate",
     "Filter",
     "Flown",
+    "GivenSettings",
     "Imu",
     "Innovation",
     "Outputs",

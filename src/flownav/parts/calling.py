@@ -8,7 +8,7 @@ from typing import Any
 
 from flownav.core.errors import InputError
 
-LONGEST_NAME, LONGEST_SAID = 60, 400  # letters of a message; a compiler writes pages
+LONGEST_NAME, LONGEST_MESSAGE = 60, 400  # letters of a message; a compiler writes pages
 KINDS = {"p": ctypes.c_void_p, "q": ctypes.c_void_p, "d": ctypes.c_double, "i": ctypes.c_int64}
 
 
@@ -23,12 +23,12 @@ class Mistakes:
         """InputError with the part's exception as its cause, or Ctrl-C; nothing where all went well."""
         if self.first is None:
             return
-        with telling(self.name):
+        with naming_part(self.name):
             raise self.first
 
 
 @contextmanager
-def telling(name: str) -> Iterator[None]:
+def naming_part(name: str) -> Iterator[None]:
     """Turn a part's exception into an InputError of one line with that exception as its cause; Ctrl-C stays Ctrl-C."""
     try:
         yield
@@ -41,11 +41,11 @@ def telling(name: str) -> Iterator[None]:
 def words_of(mistake: BaseException) -> str:
     """An exception in one line, its kind and its message, if it has one."""
     try:
-        said = " ".join(str(mistake).split())
+        message = " ".join(str(mistake).split())
     except Exception:
-        said = ""
-    half = LONGEST_SAID // 2
-    short = said if len(said) <= LONGEST_SAID else f"{said[:half]} ... {said[-half:]}"
+        message = ""
+    half = LONGEST_MESSAGE // 2
+    short = message if len(message) <= LONGEST_MESSAGE else f"{message[:half]} ... {message[-half:]}"
     return f"{type(mistake).__name__}: {short}" if short else type(mistake).__name__
 
 

@@ -34,8 +34,8 @@ from flownav.navigation.memory import (
 from flownav.navigation.records import Reading as Row
 from flownav.navigation.take import UNIT_SIGNATURE
 from flownav.navigation.tape import ESTIMATE_PERIOD_S, output_of, write_estimate
-from flownav.parts.calling import telling
-from flownav.parts.protocols import Estimate, Imu, Innovation, Outputs, Reading, Told
+from flownav.parts.calling import naming_part
+from flownav.parts.protocols import Estimate, GivenSettings, Imu, Innovation, Outputs, Reading
 from flownav.simulation import layout
 from flownav.simulation.layout import load_around, load_controls
 from flownav.vehicle.state import Around, Controls
@@ -44,7 +44,7 @@ RIGID = 13
 NAN = math.nan
 
 
-class Said(NamedTuple):
+class EquationEstimate(NamedTuple):
     """The estimate of a filter, as `protocols.Estimate` in scalars. known: 1 once it has started; variances in m2,
     m2/s2.
 
@@ -80,12 +80,12 @@ class Said(NamedTuple):
 
 def address_of(compiled: Unit, name: str) -> int:
     """The address of a part's equations, compiled where they are not yet. InputError where they cannot be."""
-    with telling(f"{name}: its equations cannot be compiled"):
+    with naming_part(f"{name}: its equations cannot be compiled"):
         return compiled.address
 
 
 # the rows from which simulator and tape read a filter's estimate, field by field
-SAID_ROWS = (
+ESTIMATE_ROWS = (
     START,
     *range(STATE + POSITION, STATE + POSITION + 3),
     *range(STATE + VELOCITY, STATE + VELOCITY + 3),
@@ -97,7 +97,10 @@ SAID_ROWS = (
     GROUND_SEEN,
     STATE + GROUND,
 )
-_, put_said = lane_access(Said, SAID_ROWS)
+_, put_estimate = lane_access(EquationEstimate, ESTIMATE_ROWS)
+
+
+Said = EquationEstimate  # its earlier name
 
 
 class EquationFilter:
@@ -109,7 +112,11 @@ class EquationFilter:
     """
 
     def __init__(
-        self, name: str, memory: Any, step: Callable[[Any, float, int, Row], Any], say: Callable[[Any], Said]
+        self,
+        name: str,
+        memory: Any,
+        step: Callable[[Any, float, int, Row], Any],
+        say: Callable[[Any], EquationEstimate],
     ) -> None:
         if len(memory) > OWN_ROWS:
             raise InputError(f"filter {name}: its memory has {len(memory)} numbers; at most {OWN_ROWS} have room")
@@ -133,7 +140,7 @@ class EquationFilter:
                     store(work, lanes, lane, initial)
                 after = step(load(work, lanes, lane), t_s, sensor, load_reading(work, lanes, lane))
                 store(work, lanes, lane, after)
-                put_said(work, lanes, lane, say(after))
+                put_estimate(work, lanes, lane, say(after))
             share(work, lanes, CLOCK, t_s)
             if t_s - shared(work, lanes, LAST_ESTIMATE) >= ESTIMATE_PERIOD_S:
                 share(work, lanes, LAST_ESTIMATE, t_s)
@@ -158,7 +165,7 @@ class EquationFilter:
         return other
 
     # -- the slow path: `protocols.Filter` on the same equations
-    def start(self, told: Told) -> None:
+    def start(self, given: GivenSettings) -> None:
         """Begin: nothing is known yet."""
         self._now = self.memory
 
@@ -179,12 +186,12 @@ class EquationFilter:
 
     def estimate(self) -> Estimate | None:
         """The estimate, from `say`."""
-        said = self.say(self._now)
-        if not said.known:
+        now = self.say(self._now)
+        if not now.known:
             return None
         return Estimate(
-            said[1:4], said[4:7], said[7:11], np.sqrt(said[11:14]), np.sqrt(said[14:17]), said[17:20], said[20:23],
-            said.ground_d if said.grounded else None,
+            now[1:4], now[4:7], now[7:11], np.sqrt(now[11:14]), np.sqrt(now[14:17]), now[17:20], now[20:23],
+            now.ground_d if now.grounded else None,
         )  # fmt: skip
 
 

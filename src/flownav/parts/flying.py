@@ -25,15 +25,15 @@ from flownav.core.errors import InputError
 from flownav.core.measurement import Array
 from flownav.core.record import POSITION_NED, VELOCITY_BODY, Record
 from flownav.logs.log import Log
+from flownav.navigation.kernel_settings import carries_lag
 from flownav.navigation.loop import Running
 from flownav.navigation.packed import load_flow_settings
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.take import navigator_unit
-from flownav.navigation.told import carries_lag
-from flownav.parts.calling import Mistakes, name_of, telling, words_of
+from flownav.parts.calling import Mistakes, name_of, naming_part, words_of
 from flownav.parts.equations import EquationFilter, EquationVehicle, address_of
 from flownav.parts.plant import OwnController, OwnReadings, OwnVehicle
-from flownav.parts.protocols import Filter, Parts, Told
+from flownav.parts.protocols import Filter, GivenSettings, Parts
 from flownav.parts.taking import LARGEST, Taker
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import Replay, replay
@@ -109,10 +109,10 @@ def require_started(flight: Flight, history: Array, name: str) -> None:
     """
     assert flight.table is not None
     first = math.ceil(flight.plan.handover_s / EPOCH_S) + flight.table.horizon_epochs + 1
-    said = np.isfinite(history[first:, column("horizon", "error_pos_n_m")])
-    if len(said) and not said[0].all():
-        silent = int(np.argmin(said[0]))
-        late = np.flatnonzero(said[:, silent])
+    finite = np.isfinite(history[first:, column("horizon", "error_pos_n_m")])
+    if len(finite) and not finite[0].all():
+        silent = int(np.argmin(finite[0]))
+        late = np.flatnonzero(finite[:, silent])
         when = (
             f"gave its first estimate at {(first + late[0]) * EPOCH_S:.2f} s" if len(late) else "never gave an estimate"
         )
@@ -151,12 +151,12 @@ def fly_parts(
             compiled = parts.filter.unit(ONE_LANE)
             instead = address_of(compiled, f"filter {name_of(parts.filter)}")
         elif parts.filter is not None:
-            told = Told(fitted.told.settings.settings(fitted.equipment, fitted.told.noise))
-            taker = Taker(parts.filter, told, b.nav, b.tape, mistakes)
+            given = GivenSettings(fitted.given.settings.settings(fitted.equipment, fitted.given.noise))
+            taker = Taker(parts.filter, given, b.nav, b.tape, mistakes)
             instead = taker.address
         if parts.sensors:
             for sensor in parts.sensors:
-                with telling(f"sensor {name_of(sensor)}"):
+                with naming_part(f"sensor {name_of(sensor)}"):
                     sensor.start(seed, index)
             then: Callable[..., None] = taker.called.entry if taker else compiled
             readings = OwnReadings(parts.sensors, table, b, then, mistakes)
@@ -234,9 +234,9 @@ def _digest(part: Any) -> str:
     made_of = [part if isinstance(part, type) or inspect.isfunction(part) else type(part)]
     if not isinstance(part, type) and not inspect.isfunction(part):
         own = vars(part) if hasattr(part, "__dict__") else {}
-        told = {name: value for name, value in own.items() if not name.startswith("_") and name != "unit_source"}
-        made_of += [value for value in told.values() if inspect.isfunction(value)]
-        numbers = {name: value for name, value in told.items() if not inspect.isfunction(value)}
+        public = {name: value for name, value in own.items() if not name.startswith("_") and name != "unit_source"}
+        made_of += [value for value in public.values() if inspect.isfunction(value)]
+        numbers = {name: value for name, value in public.items() if not inspect.isfunction(value)}
         try:
             digest.update(json.dumps(numbers, sort_keys=True, default=_plain).encode())
         except (TypeError, ValueError, RecursionError):  # keys of several kinds, or what holds itself
@@ -271,7 +271,7 @@ def replay_with(log: Log, options: ReplayOptions, settings: NavigatorSettingsFil
     def instead(running: Running) -> int:
         if isinstance(part, EquationFilter):
             return address_of(part.unit(ONE_LANE), f"filter {name_of(part)}")
-        kept.append(Taker(fresh(part), Told(running.told), running.work, running.tape, mistakes))
+        kept.append(Taker(fresh(part), GivenSettings(running.given), running.work, running.tape, mistakes))
         return kept[-1].address
 
     try:
@@ -280,7 +280,7 @@ def replay_with(log: Log, options: ReplayOptions, settings: NavigatorSettingsFil
         mistakes.tell()  # its own exception is more informative than that it never started
         raise
     mistakes.tell()
-    said = flown.said
-    motion = np.column_stack([said.pos_ned_m, said.vel_frd_m_s, said.quaternion])
-    require_none(~np.all(np.abs(motion) <= LARGEST, axis=1), said.t_s, name_of(part))
+    estimate_rows = flown.estimate_rows
+    motion = np.column_stack([estimate_rows.pos_ned_m, estimate_rows.vel_frd_m_s, estimate_rows.quaternion])
+    require_none(~np.all(np.abs(motion) <= LARGEST, axis=1), estimate_rows.t_s, name_of(part))
     return flown

@@ -14,7 +14,7 @@ from flownav.core.frames import GRAVITY_M_S2, rotation_from_quaternion
 from flownav.core.measurement import COLUMNS, MAX_VALUES, Array, Sensor
 from flownav.navigation.memory import READING
 from flownav.navigation.take import UNIT_SIGNATURE
-from flownav.parts.calling import Called, Mistakes, name_of, telling
+from flownav.parts.calling import Called, Mistakes, name_of, naming_part
 from flownav.parts.protocols import Controller, Flown, SensorModel, Truth, Values, VehicleModel
 from flownav.simulation import layout
 from flownav.simulation.block import Buffers
@@ -80,7 +80,7 @@ class OwnController:
 
     def __init__(self, part: Controller, flight: Flight, work: Array, mistakes: Mistakes) -> None:
         self._part, self._flight, self._work, self._calls = part, flight, work, 0
-        with telling(f"controller {name_of(part)}"):
+        with naming_part(f"controller {name_of(part)}"):
             part.start(flight.gains)
         self.called = Called(f"controller {name_of(part)}", self._steer, "p", mistakes)
 
@@ -191,18 +191,18 @@ class OwnReadings:
         self._then(*arguments)
 
     def _replace(self, k: int, kind: Sensor, t_s: float) -> None:
-        nav, said = self._b.nav, self._parts[kind].read(self._truth.at(t_s))
-        nav[ARRIVED] = 0.0 if said is None else 1.0
-        if said is not None:
-            nav[READING : READING + len(COLUMNS[kind])] = _values(kind, self._parts[kind], said)
-            nav[READING + MAX_VALUES : READING + MAX_VALUES + STATED] = _stated(self._parts[kind], said)
-            nav[QUALITY] = said.quality
+        nav, read_values = self._b.nav, self._parts[kind].read(self._truth.at(t_s))
+        nav[ARRIVED] = 0.0 if read_values is None else 1.0
+        if read_values is not None:
+            nav[READING : READING + len(COLUMNS[kind])] = _values(kind, self._parts[kind], read_values)
+            nav[READING + MAX_VALUES : READING + MAX_VALUES + STATED] = _stated(self._parts[kind], read_values)
+            nav[QUALITY] = read_values.quality
         if k < len(self._b.fed):  # what the record keeps of it
             self._b.fed[k, :, 0] = nav[READING : READING + self._b.fed.shape[1]]
 
 
-def _values(kind: Sensor, part: SensorModel, said: Values) -> tuple[float, ...]:
-    values = tuple(float(value) for value in said.value)
+def _values(kind: Sensor, part: SensorModel, read_values: Values) -> tuple[float, ...]:
+    values = tuple(float(value) for value in read_values.value)
     if len(values) != len(COLUMNS[kind]):
         names = ", ".join(COLUMNS[kind])
         raise InputError(f"sensor {name_of(part)}: read() gave {len(values)} values; {kind.name} has {names}")
@@ -212,12 +212,12 @@ def _values(kind: Sensor, part: SensorModel, said: Values) -> tuple[float, ...]:
     return values
 
 
-def _stated(part: SensorModel, said: Values) -> tuple[float, ...]:
-    variance = tuple(float(value) for value in said.variance)
+def _stated(part: SensorModel, read_values: Values) -> tuple[float, ...]:
+    variance = tuple(float(value) for value in read_values.variance)
     if len(variance) != STATED or any(value < 0.0 for value in variance):
         raise InputError(f"sensor {name_of(part)}: variance {variance}: three of 0 or more, NaN for none, are needed")
-    if not 0.0 <= said.quality <= BEST_QUALITY:
-        raise InputError(f"sensor {name_of(part)}: quality {said.quality}: 0 (no data) to 255 is needed")
+    if not 0.0 <= read_values.quality <= BEST_QUALITY:
+        raise InputError(f"sensor {name_of(part)}: quality {read_values.quality}: 0 (no data) to 255 is needed")
     return variance
 
 

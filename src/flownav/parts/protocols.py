@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import Reference
 from flownav.core.measurement import Array, Sensor
-from flownav.navigation.told import NavigatorSettings
+from flownav.navigation.kernel_settings import NavigatorSettings
 from flownav.vehicle.state import Around, Controls
 
 UNKNOWN = (math.nan, math.nan, math.nan)
@@ -43,7 +43,7 @@ class Reading(NamedTuple):
     quality: float
 
 
-class Told(NamedTuple):
+class GivenSettings(NamedTuple):
     """The settings that a filter is given before its first reading.
 
     settings: noise, lever arms and gains, as our own navigator gets them.
@@ -95,7 +95,7 @@ class Filter(Protocol):
     read after each of them.
     """
 
-    def start(self, told: Told) -> None:
+    def start(self, given: GivenSettings) -> None:
         """Once, before the first reading."""
 
     def predict(self, t_s: float, imu: Imu | None) -> None:

@@ -22,7 +22,7 @@ from flownav.navigation.rows import EXTRA_STATES, EstimateRow, InnovationRow
 from flownav.navigation.take import UNIT_SIGNATURE
 from flownav.navigation.tape import ESTIMATE_PERIOD_S, ESTIMATES, OFFERED_ROWS, Tape
 from flownav.parts.calling import Called, Mistakes, name_of
-from flownav.parts.protocols import Estimate, Filter, Imu, Innovation, Reading, Told
+from flownav.parts.protocols import Estimate, Filter, GivenSettings, Imu, Innovation, Reading
 
 STATED = 3
 QUALITY, ARRIVED, WITHHELD = (READING + MAX_VALUES + STATED + i for i in range(3))
@@ -34,8 +34,8 @@ UNIT_TOLERANCE = 1e-3  # how far a quaternion's length may be from 1
 class Taker:
     """The filter between the rows of a lane buffer and a tape."""
 
-    def __init__(self, part: Filter, told: Told, nav: Array, tape: Tape, mistakes: Mistakes) -> None:
-        self.part, self.told, self.nav, self.tape = part, told, nav, tape
+    def __init__(self, part: Filter, given: GivenSettings, nav: Array, tape: Tape, mistakes: Mistakes) -> None:
+        self.part, self.given, self.nav, self.tape = part, given, nav, tape
         self.name = name_of(part)
         self.called = Called(f"filter {self.name}", self._called, UNIT_SIGNATURE, mistakes)
         self.begun, self.clock_s, self.written_s, self.imu_s = False, -math.inf, -math.inf, -math.inf
@@ -53,7 +53,7 @@ class Taker:
         """The reading in the rows of READING, of an instant."""
         if not self.begun:
             self.begun = True
-            self.part.start(self.told)
+            self.part.start(self.given)
         nav = self.nav
         values = nav[READING : READING + MAX_VALUES]
         arrived = nav[ARRIVED] > 0.0
@@ -70,16 +70,16 @@ class Taker:
             news = self.part.update(Reading(t_s, sensor, values[:width].copy(), variance, float(nav[QUALITY])))
             self._offer(t_s, sensor, news or ())
         nav[CLOCK] = t_s
-        said, due = self.part.estimate(), t_s - self.written_s >= ESTIMATE_PERIOD_S
+        estimate_, due = self.part.estimate(), t_s - self.written_s >= ESTIMATE_PERIOD_S
         self.written_s = t_s if due else self.written_s
-        if said is not None:
-            numbers = self._say(said)
+        if estimate_ is not None:
+            numbers = self._say(estimate_)
             if due:
                 self._write(t_s, numbers)
 
-    def _say(self, said: Estimate) -> dict[str, Array]:
+    def _say(self, estimate_: Estimate) -> dict[str, Array]:
         """The estimate into the rows that the simulator reads; as arrays."""
-        nav, numbers = self.nav, checked(self.name, said)
+        nav, numbers = self.nav, checked(self.name, estimate_)
         for row, key in (
             (STATE + POSITION, "pos_ned_m"), (STATE + VELOCITY, "vel_ned_m_s"), (QUATERNION, "quaternion"),
             (STATE + GYRO_BIAS, "gyro_bias_rad_s"), (STATE + ACCEL_BIAS, "accel_bias_m_s2"),
@@ -89,10 +89,10 @@ class Taker:
             for axis in range(3):
                 nav[place(first + axis, first + axis)] = numbers[key][axis] ** 2
         nav[START] = 1.0
-        if said.ground_d_m is not None:
-            nav[STATE + GROUND], nav[GROUND_SEEN] = said.ground_d_m, 1.0
-        if said.pad_ned_m is not None:
-            nav[STATE + PAD : STATE + PAD + 3], nav[PAD_KNOWN] = tuple(said.pad_ned_m), SEEN
+        if estimate_.ground_d_m is not None:
+            nav[STATE + GROUND], nav[GROUND_SEEN] = estimate_.ground_d_m, 1.0
+        if estimate_.pad_ned_m is not None:
+            nav[STATE + PAD : STATE + PAD + 3], nav[PAD_KNOWN] = tuple(estimate_.pad_ned_m), SEEN
         return numbers
 
     def _write(self, t_s: float, numbers: dict[str, Array]) -> None:
@@ -122,7 +122,7 @@ class Taker:
         """Innovations onto the tape, as ours are."""
         used = self.tape.used
         for each in news:
-            require_told(self.name, each)
+            require_innovation(self.name, each)
             if used[OFFERED_ROWS] >= len(self.tape.innovation):
                 return
             ratio = each.innovation**2 / (25.0 * each.variance) if each.variance > 0.0 else math.nan
@@ -134,7 +134,7 @@ class Taker:
             used[OFFERED_ROWS] += 1
 
 
-def require_told(name: str, each: Innovation) -> None:
+def require_innovation(name: str, each: Innovation) -> None:
     """InputError where an innovation is no number, or its variance is none."""
     if not math.isfinite(each.innovation) or not (math.isfinite(each.variance) and each.variance > 0.0):
         raise InputError(
@@ -143,14 +143,14 @@ def require_told(name: str, each: Innovation) -> None:
         )
 
 
-def checked(name: str, said: Estimate) -> dict[str, Array]:
+def checked(name: str, estimate_: Estimate) -> dict[str, Array]:
     """An estimate as arrays. InputError where a part of it has another length, is not finite or is no rotation."""
     lengths = {"quaternion": 4}
     found: dict[str, Array] = {}
     for key in ("pos_ned_m", "vel_ned_m_s", "quaternion", "std_pos_ned_m", "std_vel_ned_m_s", "gyro_bias_rad_s",
                 "accel_bias_m_s2"):  # fmt: skip
         length = lengths.get(key, 3)
-        array = np.asarray(tuple(islice(getattr(said, key), length + 1)), dtype=float)
+        array = np.asarray(tuple(islice(getattr(estimate_, key), length + 1)), dtype=float)
         if array.shape != (length,):
             raise InputError(f"{name}: estimate().{key} has shape {array.shape}; ({length},) is needed")
         if not key.startswith("std_") and not np.isfinite(array).all():
@@ -162,7 +162,7 @@ def checked(name: str, said: Estimate) -> dict[str, Array]:
         found[key] = array
     places = (("ground_d_m", 1), ("pad_ned_m", 3))
     for key, length in places:
-        value = getattr(said, key)
+        value = getattr(estimate_, key)
         if value is not None:
             array = np.atleast_1d(np.asarray(value, dtype=float))
             if array.shape != (length,) or not np.isfinite(array).all():

@@ -10,7 +10,7 @@ import numpy as np
 
 from flownav.core.frames import GRAVITY_M_S2, quaternion_product, rotation_from_quaternion, velocity_from_flow
 from flownav.core.measurement import Array
-from flownav.navigation.told import FlowSettings, GpsSettings, NavigatorSettings
+from flownav.navigation.kernel_settings import FlowSettings, GpsSettings, NavigatorSettings
 from flownav.parts.protocols import Imu, Reading
 
 LEAST_GPS_M = 0.3
@@ -55,8 +55,8 @@ def flow_velocity(reading: Reading, range_m: float, s: FlowSettings, turning_rad
     flow_x = w_x - v_y/r and flow_y = w_y + v_x/r (PX4's convention), gains of the datasheet taken off. turning_rad_s
     (2,): the vehicle's rates about x and y over the exposure, where the reading does not carry them.
     """
-    carried = reading.value[4:6] if len(reading.value) > 4 else np.full(2, np.nan)
-    turning = np.where(np.isfinite(carried), carried, turning_rad_s)
+    gyro_rad_s = reading.value[4:6] if len(reading.value) > 4 else np.full(2, np.nan)
+    turning = np.where(np.isfinite(gyro_rad_s), gyro_rad_s, turning_rad_s)
     seen_x, seen_y = reading.value[:2] - turning
     forward_m_s, right_m_s = velocity_from_flow(seen_x, seen_y, range_m)
     return np.array([forward_m_s / s.flow_gain_x, right_m_s / s.flow_gain_y])

@@ -42,7 +42,7 @@ FOUND = "the log has no attitude: it is the navigator's own, from IMU and flow, 
 def to_record(replay: Replay, scores: dict[str, Any], command: list[str] | str) -> Record:
     """The record of a replay. `scores` go into its manifest; `command` is what the user typed or called."""
     record = Record(_manifest(replay, scores, command))
-    estimate, said = replay.estimate, replay.said
+    estimate, estimate_rows = replay.estimate, replay.estimate_rows
     record.add("estimate", estimate_table(estimate))
     record.add("states", states_table(estimate))
     if replay.smoothed is not None:
@@ -56,9 +56,12 @@ def to_record(replay: Replay, scores: dict[str, Any], command: list[str] | str) 
         record.add("truth", _truth(replay))
     for name, table in _references(replay).items():
         record.add(name, table)
-    warned = flagged(said.t_s, flags_of(replay.written.event))
-    record.add("judging", {"t_s": said.t_s, "flagged": warned.astype(float)})
-    log, placed = replay.log, placed_here(replay.log, replay.options.gps_delay_s, said.t_s, said.pos_ned_m)
+    warned = flagged(estimate_rows.t_s, flags_of(replay.written.event))
+    record.add("judging", {"t_s": estimate_rows.t_s, "flagged": warned.astype(float)})
+    log, placed = (
+        replay.log,
+        placed_here(replay.log, replay.options.gps_delay_s, estimate_rows.t_s, estimate_rows.pos_ned_m),
+    )
     own, asked = autopilot_path(log, placed), setpoints(log, placed)
     for name, beside in (("autopilot", own), ("setpoint", asked), ("battery", log.battery)):
         if beside is not None:
@@ -191,7 +194,7 @@ def with_attitude(log: Log, axes: Array | None = None) -> tuple[Log, str]:
             f"{log.path}: neither attitude nor IMU; one of them turns the reference into the sensor's axes"
         )
     options = ReplayOptions() if axes is None else ReplayOptions(identified=turned_sensor(log, axes))
-    found = replay(log, options, NavigatorSettingsFile()).said
+    found = replay(log, options, NavigatorSettingsFile()).estimate_rows
     known = np.isfinite(found.quaternion).all(axis=1)
     attitude = Stream.of(Sensor.ATTITUDE, found.t_s[known], found.quaternion[known])
     return replace(log, streams={**log.streams, Sensor.ATTITUDE: attitude}), FOUND

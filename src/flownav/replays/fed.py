@@ -10,11 +10,11 @@ from flownav.core.measurement import EventQueue, Sensor
 from flownav.core.parameter_files import check
 from flownav.logs.log import FedSegment, Log
 from flownav.navigation.feed import equipment_of
+from flownav.navigation.kernel_settings import NO_STATED_NOISE, Equipment, FlowNoise
 from flownav.navigation.loop import Instead, run, start_navigator
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tables import Written, written_on
 from flownav.navigation.tape import tape_for
-from flownav.navigation.told import NO_STATED_NOISE, Equipment, FlowNoise
 from flownav.replays.prepare import Prepared, ReplayOptions, check_windows, prepare
 
 
@@ -35,12 +35,12 @@ def as_fed(
     try:
         for segment in log.fed:
             Equipment(**segment.equipment)
-        told, noise = dict(log.fed_settings["filter"]), log.fed_settings.get("flow_noise")
+        filter_keys, noise = dict(log.fed_settings["filter"]), log.fed_settings.get("flow_noise")
         delay_s = float(log.fed_settings["gps_delay_s"])
         stated = FlowNoise(**{name: float(value) for name, value in noise.items()}) if noise else NO_STATED_NOISE
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(f"{log.path}: it lacks the settings of its navigators ({error}); write it again") from error
-    recorded = check(told, NavigatorSettingsFile, str(log.path))
+    recorded = check(filter_keys, NavigatorSettingsFile, str(log.path))
     return replace(options, gps_delay_s=delay_s, flow_noise=stated), settings or recorded
 
 

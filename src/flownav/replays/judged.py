@@ -72,8 +72,8 @@ def flying_at(log: Log, t_s: Array) -> NDArray[np.bool_]:
         return np.asarray(inside)
     landed = log.streams[Sensor.LANDED]
     row = np.clip(np.searchsorted(landed.t_s, t_s, side="right") - 1, 0, len(landed) - 1)
-    said = landed.value[row, 0] < 0.5
-    return np.asarray(inside & said if (landed.value[:, 0] < 0.5).any() else inside)
+    airborne = landed.value[row, 0] < 0.5
+    return np.asarray(inside & airborne if (landed.value[:, 0] < 0.5).any() else inside)
 
 
 def obstacles(log: Log) -> list[str]:
@@ -103,7 +103,7 @@ def consistency_scores(innovation: Array, landed: Stream | None = None) -> dict[
     )  # fmt: skip
 
 
-def told(innovation: Array) -> Array:
+def before_delay(innovation: Array) -> Array:
     """The offered components without those that their sensor left out (MAVLink's GPS has no vertical velocity).
 
     A component is left out where it is NaN and another of the same reading is not.
@@ -127,7 +127,7 @@ def reading_scores(innovation: Array, streams: Mapping[Sensor, Stream]) -> dict[
     threw away.
     """
     found = {}
-    innovation = told(innovation)
+    innovation = before_delay(innovation)
     for sensor, stream in streams.items():
         offers = InnovationRow.of(innovation[InnovationRow.of(innovation).sensor == sensor])
         reading, reason = _readings(offers), offers.reason.astype(int)
@@ -173,8 +173,8 @@ def unfused(innovation: Array, streams: Mapping[Sensor, Stream]) -> list[Finding
         why[LATE] += streams[sensor].rejected.get(LATE, 0)
         if why.total() >= LEAST_READINGS and fused < LEAST_SHARE * (fused + why.total()):
             reasons = ", ".join(f"{reason} {count}" for reason, count in why.most_common() if count)
-            heard = f"{sensor.name.lower()} was received and {'hardly' if fused else 'never'} fused"
-            text = f"{heard} ({fused} readings; {reasons}): the estimate rests on the other sensors"
+            sentence = f"{sensor.name.lower()} was received and {'hardly' if fused else 'never'} fused"
+            text = f"{sentence} ({fused} readings; {reasons}): the estimate rests on the other sensors"
             found.append(Finding(text, unfused=True))
     return found
 

@@ -16,8 +16,8 @@ from flownav.core.errors import InputError, arg
 from flownav.core.measurement import Array, EventQueue, Sensor, Stream, merge, merged_parts
 from flownav.logs.log import Log, attitude_rates, mean_over
 from flownav.navigation.feed import imu_serves
+from flownav.navigation.kernel_settings import NO_STATED_NOISE, FlowNoise
 from flownav.navigation.spikes import Witness
-from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
 from flownav.sensors.datasheet import IdentifiedFlow, in_vehicle_axes
 
 GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)

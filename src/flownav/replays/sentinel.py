@@ -92,19 +92,19 @@ def findings(streams: dict[Sensor, Stream], gps_outages_s: Iterable[tuple[float,
     """The findings that GPS shows about the flow, the heading, the clock and its own climb rate. `streams` with their
     delays.
     """
-    heard: dict[Sensor, Stream] = {
+    gps_streams: dict[Sensor, Stream] = {
         sensor: _kept(streams[sensor], gps_outages_s)
         for sensor in (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
         if sensor in streams
     }
-    found = _of_climb(streams, heard)
+    found = _of_climb(streams, gps_streams)
     flow = streams.get(Sensor.FLOW_RATE) or streams.get(Sensor.FLOW_VELOCITY)
-    if flow is None or Sensor.GPS_VELOCITY not in heard or Sensor.ATTITUDE not in streams:
+    if flow is None or Sensor.GPS_VELOCITY not in gps_streams or Sensor.ATTITUDE not in streams:
         return found
     flow = _usable(flow, streams)
     if len(flow) < LEAST_PAIRS:
         return found
-    course = _course(heard[Sensor.GPS_VELOCITY], flow)
+    course = _course(gps_streams[Sensor.GPS_VELOCITY], flow)
     return found if course is None else _of_flow(course, flow, streams) + found
 
 
@@ -126,8 +126,10 @@ def _of_flow(course: Course, flow: Stream, streams: dict[Sensor, Stream]) -> lis
         reading = min(alike, key=lambda reading: left[reading])
     if left[reading] > UNEXPLAINED_SHARE:
         return []
-    said = [Finding(f"{READINGS[reading]} against GPS; mend the log's flow columns", True)] if READINGS[reading] else []
-    return [*said, *map(Finding, _of_heading_and_clock(fits[reading]))]
+    sentences = (
+        [Finding(f"{READINGS[reading]} against GPS; mend the log's flow columns", True)] if READINGS[reading] else []
+    )
+    return [*sentences, *map(Finding, _of_heading_and_clock(fits[reading]))]
 
 
 def _of_heading_and_clock(fits: tuple[Fit, ...]) -> list[str]:
@@ -137,9 +139,9 @@ def _of_heading_and_clock(fits: tuple[Fit, ...]) -> list[str]:
     if as_it_is.unexplained <= enough:
         return []
     single = [fit for fit in (turned, late) if fit.unexplained <= enough]
-    said = [_words(fit) for fit in sorted(single)] or [_words(both)]
-    said = [words for words in said if words]
-    return [", or ".join(said)] if said else []
+    sentences = [_words(fit) for fit in sorted(single)] or [_words(both)]
+    sentences = [words for words in sentences if words]
+    return [", or ".join(sentences)] if sentences else []
 
 
 def _words(fit: Fit) -> str:
@@ -265,11 +267,11 @@ def _rotation_noise(flow: Stream) -> dict[Matrix, float]:
 
 
 # -- climb -------------------------------------------------------------------------------------------------
-def _of_climb(streams: dict[Sensor, Stream], heard: dict[Sensor, Stream]) -> list[Finding]:
+def _of_climb(streams: dict[Sensor, Stream], gps_streams: dict[Sensor, Stream]) -> list[Finding]:
     """GPS vertical velocity against the rate of GPS altitude, and of the range."""
-    if len(heard) < 2:
+    if len(gps_streams) < 2:
         return []
-    position, velocity = heard[Sensor.GPS_POSITION], heard[Sensor.GPS_VELOCITY]
+    position, velocity = gps_streams[Sensor.GPS_POSITION], gps_streams[Sensor.GPS_VELOCITY]
     known = np.isfinite(velocity.value[:, 2])
     if np.count_nonzero(known) < LEAST_PAIRS:
         return []

@@ -63,7 +63,7 @@ class Replay:
         return self.written.innovation
 
     @property
-    def said(self) -> EstimateRow[Array]:
+    def estimate_rows(self) -> EstimateRow[Array]:
         """The columns of the estimates."""
         return EstimateRow.of(self.estimate)
 
@@ -75,7 +75,7 @@ class Replay:
     @cached_property
     def attitude(self) -> Stream:
         """The estimated attitude."""
-        return Stream.of(Sensor.ATTITUDE, self.said.t_s, self.said.quaternion)
+        return Stream.of(Sensor.ATTITUDE, self.estimate_rows.t_s, self.estimate_rows.quaternion)
 
     @cached_property
     def findings(self) -> list[Finding]:
@@ -116,7 +116,7 @@ class Replay:
     def rejected(self) -> dict[str, dict[str, int]]:
         """Counts of rejections by sensor and reason: rows by the reader, components by the filter, added up."""
         counts = {}
-        offered = InnovationRow.of(judged.told(self.innovation))
+        offered = InnovationRow.of(judged.before_delay(self.innovation))
         sensors, reasons = offered.sensor.astype(int), offered.reason.astype(int)
         for sensor, stream in self.log.streams.items():
             numbers = np.bincount(reasons[sensors == sensor], minlength=len(Reason))
@@ -128,7 +128,7 @@ class Replay:
     def scores(self) -> dict[str, Any]:
         """The output of `--json`, except the outage table and the record's path."""
         start, end = self.log.span_s
-        warned = flagged(self.said.t_s, flags_of(self.written.event))
+        warned = flagged(self.estimate_rows.t_s, flags_of(self.written.event))
         scores: dict[str, Any] = {
             **estimate_scores(self.table, self.references, end - start, warned),
             "consistency": judged.consistency_scores(self.innovation, self.log.streams.get(Sensor.LANDED)),
@@ -249,8 +249,8 @@ def _feed(parts: Iterable[EventQueue], on: Running, instead: int | None, until_s
         for begin, end in pairwise([0, *ends, count]):
             run(EventQueue._make(column[begin:end] for column in part), on, instead=instead)
             if np.isfinite(until_s):
-                told_s = EstimateRow.of(written_on(on.tape).estimate).t_s
-                if len(told_s) > 1 and told_s[-1] > until_s:
+                written_s = EstimateRow.of(written_on(on.tape).estimate).t_s
+                if len(written_s) > 1 and written_s[-1] > until_s:
                     return
 
 

@@ -196,7 +196,7 @@ def render_certificate(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> st
         together=together(facts),
         chosen=chosen(facts),
         conditions=conditions(facts),
-        worst=[worst_of(facts, told) for told in facts["worst"]],
+        worst=[worst_of(facts, flight) for flight in facts["worst"]],
         axes=[key_words(name) for name in facts["envelope"]["axes"]],
         known=certificate_figures.KNOWN_WORDS,
         groups=tables.groups,
@@ -262,8 +262,8 @@ def conditions(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     for name, entry in given.pop("ranges", {}).items():
         low, high = entry.get("loc", 0.0), entry.get("loc", 0.0) + entry.get("scale", 1.0)
         even = entry["distribution"] == "uniform"
-        said = f"{low:.15g} to {high:.15g}, evenly" if even else tables.text(entry)
-        rows.append((key_words(name), said))
+        range_words = f"{low:.15g} to {high:.15g}, evenly" if even else tables.text(entry)
+        rows.append((key_words(name), range_words))
     for name, value in given.items():
         if value == []:
             continue
@@ -273,15 +273,15 @@ def conditions(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     return rows
 
 
-def worst_of(facts: Mapping[str, Any], told: Mapping[str, Any]) -> dict[str, Any]:
+def worst_of(facts: Mapping[str, Any], flight: Mapping[str, Any]) -> dict[str, Any]:
     """One of the worst flights as text."""
     of = {one["measure"]: one for one in facts["requirement"]["requirements"]}
-    said = [
+    inputs_words = [
         number(value, 3 if of[name]["unit"] else 0) if value is not None else "none"
-        for name, value in told["figures"].items()
+        for name, value in flight["figures"].items()
     ]
-    inputs = [number(told["inputs"][name], 1) for name in facts["envelope"]["axes"]]
-    return dict(told) | {"said": said, "where": inputs, "report": told.get("report")}
+    inputs = [number(flight["inputs"][name], 1) for name in facts["envelope"]["axes"]]
+    return dict(flight) | {"said": inputs_words, "where": inputs, "report": flight.get("report")}
 
 
 def by_folder(digests: Mapping[str, str]) -> dict[str, str]:

@@ -170,8 +170,8 @@ def envelope(key: str, cell: dict[str, Any]) -> Panel | None:
     for ring in rings:
         own = [one for one in cell["envelope"] if one["from_m_s"] == ring and one["landed"] is not None]
         theta, ends = [one["direction_deg"] for one in own], [one["to_m_s"] for one in own]
-        said, share = [_wind_words(one) for one in own], [one["landed"] for one in own]
-        data.append(_ring(ring, ends, theta, float(steps.min()), share, said))
+        labels, share = [_wind_words(one) for one in own], [one["landed"] for one in own]
+        data.append(_ring(ring, ends, theta, float(steps.min()), share, labels))
     quiet = {"gridcolor": COLOUR["grid"], "tickfont": {"color": COLOUR["muted"]}, "linecolor": COLOUR["rule"]}
     low = min((one["landed"] for one in cell["envelope"] if one["landed"] is not None), default=0.0)
     look = (
@@ -191,23 +191,23 @@ def envelope(key: str, cell: dict[str, Any]) -> Panel | None:
 
 def sensitivity(key: str, cell: dict[str, Any]) -> Panel | None:
     """Which of the drawn inputs go with a touchdown far off: rank correlations with their intervals."""
-    told = cell["sensitivity"][::-1]
-    if not told:
+    known_rows = cell["sensitivity"][::-1]
+    if not known_rows:
         return None
-    values = [one["rank_correlation"] for one in told]
-    sure = [one["low"] > 0.0 or one["high"] < 0.0 for one in told]
+    values = [one["rank_correlation"] for one in known_rows]
+    sure = [one["low"] > 0.0 or one["high"] < 0.0 for one in known_rows]
     bars = {
         "type": "bar", "orientation": "h", "x": values, "showlegend": False,
-        "y": [key_words(one["input"]) for one in told],
+        "y": [key_words(one["input"]) for one in known_rows],
         "marker": {"color": [COLOUR["estimate"] if each else COLOUR["pad"] for each in sure]},
         "error_x": {"type": "data", "symmetric": False, "color": COLOUR["muted"], "thickness": 1, "width": 3,
-                    "array": [one["high"] - one["rank_correlation"] for one in told],
-                    "arrayminus": [one["rank_correlation"] - one["low"] for one in told]},
+                    "array": [one["high"] - one["rank_correlation"] for one in known_rows],
+                    "arrayminus": [one["rank_correlation"] - one["low"] for one in known_rows]},
         "hovertemplate": "%{x:.2f}<extra></extra>",
     }  # fmt: skip
-    look = layout(90 + 26 * len(told)) | {"hovermode": "closest"}
+    look = layout(90 + 26 * len(known_rows)) | {"hovermode": "closest"}
     look["xaxis"] = axis("rank correlation with how far off it touched")
-    look["yaxis"] = axis() | {"automargin": True, "nticks": len(told)}
+    look["yaxis"] = axis() | {"automargin": True, "nticks": len(known_rows)}
     words = "The twelve strongest of Spearman's rank correlations, with 95 % intervals; grey: it may be nothing."
     return Panel(
         key, cell["label"], words, f"Rank correlations of the inputs of {cell['label']}", drawing([bars], look)
@@ -233,12 +233,12 @@ def over_a_sweep(cells: Sequence[dict[str, Any]], name: str) -> Panel:
     data, times = [], 100.0 if lands else 1.0
     for number, (label, own) in enumerate(lines.items()):
         known = [(cell["values"][name], cell["figures"].get(what)) for cell in own]
-        told = [(value, figure) for value, figure in known if figure and figure["value"] is not None]
+        known_rows = [(value, figure) for value, figure in known if figure and figure["value"] is not None]
         colour = COLOUR[ROLES[number % len(ROLES)]]
-        ends = {side: [times * abs((f["value"] if f[end] is None else f[end]) - f["value"]) for _, f in told]
+        ends = {side: [times * abs((f["value"] if f[end] is None else f[end]) - f["value"]) for _, f in known_rows]
                 for side, end in (("array", "high"), ("arrayminus", "low"))}  # fmt: skip
-        data.append({"type": "scatter", "mode": "lines+markers", "name": label, "x": [x for x, _ in told],
-                     "y": [times * f["value"] for _, f in told], "line": {"color": colour, "width": 1.6},
+        data.append({"type": "scatter", "mode": "lines+markers", "name": label, "x": [x for x, _ in known_rows],
+                     "y": [times * f["value"] for _, f in known_rows], "line": {"color": colour, "width": 1.6},
                      "error_y": {"type": "data", "symmetric": False, "color": colour, "thickness": 1, **ends},
                      })  # fmt: skip
     look = layout(360)
@@ -277,8 +277,8 @@ def envelope_figure(title: str, rows: Sequence[dict[str, Any]]) -> Drawing:
     for speed in speeds:
         ring = [row for row in rows if row["speed_20ft_m_s"] == speed]
         theta, share = [row["from_direction_deg"] for row in ring], [row["success"]["rate"] for row in ring]
-        width, said = 360.0 / len(directions), [_words(row) for row in ring]
-        data.append(_ring(inner, [speed] * len(ring), theta, width, share, said))
+        width, labels = 360.0 / len(directions), [_words(row) for row in ring]
+        data.append(_ring(inner, [speed] * len(ring), theta, width, share, labels))
         inner = speed
     quiet = {"gridcolor": "white", "linecolor": "white", "ticks": ""}
     look = {

@@ -180,8 +180,8 @@ def _fields(
 ) -> dict[str, Any]:
     """The fields of one kind as bars that stand on their lower edge."""
     marker = {"color": colour, "opacity": 0.7, "line": {"color": COLOUR["surface"], "width": 1.5}}
-    said = [_field_words(axes, field) for field in fields]
-    shared = {"name": words, "hovertext": said, "hoverinfo": "text", "marker": marker}
+    labels = [_field_words(axes, field) for field in fields]
+    shared = {"name": words, "hovertext": labels, "hoverinfo": "text", "marker": marker}
     if polar:
         low, turn = [np.array([field[name] for field in fields]).reshape(-1, 2) for name in axes]
         return shared | {"type": "barpolar", "base": low[:, 0].tolist(), "r": np.diff(low).ravel().tolist(),
@@ -234,10 +234,10 @@ def ranking(facts: Mapping[str, Any]) -> list[Panel]:
     bars = [dict(row) | {"name": _broken(row["input"])} for row in facts["ranking"][:MOST_BARS]]
     split = [dict(row) | {"name": KNOWN_WORDS[row["known"]]} for row in facts["split"]]
     alt = f"Bars of {len(bars)} inputs, the first being {bars[0]['name']}."
-    said = "The same of all inputs that could be known together, and of those that nobody can know, noise included."
+    sentence = "The same of all inputs that could be known together, and of those that nobody can know, noise included."
     return [
         Panel(key, title, caption, alt, _bars(bars, 90 + 34 * len(bars)), wide=True),
-        Panel("split", "Uncertainty by who could know it", said, "Bars of three classes of inputs.",
+        Panel("split", "Uncertainty by who could know it", sentence, "Bars of three classes of inputs.",
               _bars(split, 90 + 46 * len(split)), wide=True),
     ]  # fmt: skip
 

@@ -32,8 +32,10 @@ def cloud_picture(cell: dict[str, Any], touched: Touchdowns) -> Picture | None:
         (view(0, VIEW_PX, pad, _above(shown, rings, touched.pad_m, wide_m, named=False)), VIEW_PX),
         (view(1, VIEW_PX, "Close up", _above(shown, rings, touched.pad_m, near_m, named=True)), VIEW_PX),
     ]
-    told = ", ".join(f"{title} {metres(size)} m" for title, _, size in rings)
-    drawn = f"rings about the pad's centre: {told}" if rings else "too few touched for a ring that holds half of all"
+    ring_words = ", ".join(f"{title} {metres(size)} m" for title, _, size in rings)
+    drawn = (
+        f"rings about the pad's centre: {ring_words}" if rings else "too few touched for a ring that holds half of all"
+    )
     words = f"Where the flights of {cell['label']} first touched, north up; {drawn}."
     return Picture(side_by_side(views, words), words)
 

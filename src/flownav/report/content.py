@@ -45,47 +45,47 @@ def duration_s(record: Record) -> float:
 def summary(record: Record) -> str:
     """The verdict in sentences."""
     manifest, scores = record.manifest, mapping(record.manifest.get("scores"))
-    said = [KINDS.get(str(manifest.get("kind")), "A flight of {}.").format(f"{duration_s(record):.1f} s")]
-    said += landing_sentences(mapping(scores.get("touchdown")))
+    sentences = [KINDS.get(str(manifest.get("kind")), "A flight of {}.").format(f"{duration_s(record):.1f} s")]
+    sentences += landing_sentences(mapping(scores.get("touchdown")))
     headline = sentence(manifest, scores) if manifest.get("kind") == "fly" else ""
-    said = [headline, *said] if headline else said
+    sentences = [headline, *sentences] if headline else sentences
     largest = scores.get("max_position_error_m")
     if largest is not None:
         published = mapping(manifest.get("paper")).get("max_position_error_m")
         beside = f" (the paper: {metres(published)} m)" if published is not None else ""
         ever = "No axis of the estimated position was ever"
         ever = "In flight no axis of the position that the autopilot used was" if has(record, "flown") else ever
-        said.append(f"{ever} off by more than {metres(largest)} m{beside}.")
+        sentences.append(f"{ever} off by more than {metres(largest)} m{beside}.")
     if manifest.get("known_exactly"):
-        said.append(f"Known to the vehicle without error: {manifest['known_exactly']}.")
+        sentences.append(f"Known to the vehicle without error: {manifest['known_exactly']}.")
     cut = series.scored_outages(record)
     if cut:
         worst = max(cut, key=series.rms_m)
         among = f", the worst of {len(cut)} outages," if len(cut) > 1 else ""
         rms, largest = number(worst.get("horizontal_rms_m"), 2), number(worst.get("horizontal_max_m"), 2)
-        said.append(
+        sentences.append(
             f"With GPS withheld from {worst['t0']:g} to {worst['t1']:g} s{among} the position drifted "
             f"{rms} m rms and {largest} m at most."
         )
     truth = mapping(scores.get("truth"))
     if truth:
         rms, largest = number(truth.get("horizontal_rms_m"), 2), number(truth.get("horizontal_max_m"), 2)
-        said.append(
+        sentences.append(
             f"Against {_reference(record)} its position is off by {rms} m rms, {largest} m at most, horizontally."
         )
     if scores.get("end_drift_m") is not None:
-        said.append(f"Laid on each other at take-off, the two end {metres(scores['end_drift_m'])} m apart.")
+        sentences.append(f"Laid on each other at take-off, the two end {metres(scores['end_drift_m'])} m apart.")
     own = mapping(scores.get("autopilot"))
     if own.get("against"):
         rms, largest = number(own.get("horizontal_rms_m"), 2), number(own.get("horizontal_max_m"), 2)
         against = _reference(record) if own["against"] == "truth" else "GPS, their mean difference taken out"
-        said.append(
+        sentences.append(
             f"The autopilot's own estimate ({own.get('name')}) is off by {rms} m rms, "
             f"{largest} m at most, horizontally, against {against}."
         )
     if not scores:
-        said.append("The record carries no scores.")
-    return UNIT_AFTER_NUMBER.sub("\\1\N{NO-BREAK SPACE}\\2", " ".join(said))
+        sentences.append("The record carries no scores.")
+    return UNIT_AFTER_NUMBER.sub("\\1\N{NO-BREAK SPACE}\\2", " ".join(sentences))
 
 
 def _reference(record: Record) -> str:
@@ -186,13 +186,13 @@ def flow_share(record: Record) -> float | None:
 
 def explained(record: Record) -> dict[str, Any]:
     """The output of `flownav explain` on the log: verdict, causes, headings and lines of its table; {} without."""
-    told = mapping(record.manifest.get("explained"))
-    if not isinstance(told.get("verdict"), str):
+    explanation = mapping(record.manifest.get("explained"))
+    if not isinstance(explanation.get("verdict"), str):
         return {}
-    lines = [[str(cell) for cell in line] for line in told.get("lines") or [] if isinstance(line, list)]
+    lines = [[str(cell) for cell in line] for line in explanation.get("lines") or [] if isinstance(line, list)]
     return {
-        "verdict": told["verdict"], "found": bool(told.get("causes")),
-        "headings": [str(heading) for heading in told.get("headings") or []], "lines": lines,
+        "verdict": explanation["verdict"], "found": bool(explanation.get("causes")),
+        "headings": [str(heading) for heading in explanation.get("headings") or []], "lines": lines,
     }  # fmt: skip
 
 
@@ -229,28 +229,28 @@ def lacking(record: Record) -> list[str]:
 def landing_sentences(landing: Mapping[str, Any]) -> list[str]:
     """Sentences on `scores.touchdown` as one flight has it; empty where it touched nothing."""
     contact, rest, limited = (mapping(landing.get(name)) for name in ("contact", "rest", "limited_by"))
-    said = []
+    sentences = []
     if contact.get("distance_m") is not None:
-        said.append(
+        sentences.append(
             f"It touched down after {number(contact.get('t_s'), 1)} s, {metres(contact.get('distance_m'))} m from the "
             f"pad's centre, sinking at {number(contact.get('sink_rate_m_s'), 2)} m/s and drifting at "
             f"{number(contact.get('lateral_speed_m_s'), 2)} m/s."
         )
     if limited.get("estimate_m") is not None:
-        said.append(
+        sentences.append(
             f"Of that its estimate was off by {metres(limited.get('estimate_m'))} m, its guidance by "
             f"{metres(limited.get('guidance_m'))} m and the pad's place by {metres(limited.get('pad_m'))} m."
         )
     if rest.get("distance_m") is not None:
-        said.append(
+        sentences.append(
             f"It came to rest {metres(rest.get('distance_m'))} m from the centre, {metres(rest.get('slide_m'))} m from "
             "where it touched."
         )
     if landing.get("broken"):
-        said.append(f"It crashed: {', '.join(landing['broken'])}.")
+        sentences.append(f"It crashed: {', '.join(landing['broken'])}.")
     if landing.get("reason"):
-        said.append(f"It never landed: {landing['reason']}.")
-    return said
+        sentences.append(f"It never landed: {landing['reason']}.")
+    return sentences
 
 
 def parts_of(limited: Mapping[str, Any]) -> tuple[Part, ...]:

@@ -17,7 +17,7 @@ POSITION_ERRORS = ("x error (m)", "y error (m)", "z error (m)")
 VELOCITY_ERRORS = ("u error (m/s)", "v error (m/s)", "w error (m/s)")
 # what errors are taken of: states, titles of the axes, word, unit
 ERRORS = ((POSITION_NED, POSITION_ERRORS, "position", "m"), (VELOCITY_BODY, VELOCITY_ERRORS, "velocity", "m/s"))
-SAID = {"flown": "autopilot's input", "estimate": "estimate"}
+ROLE_WORDS = {"flown": "autopilot's input", "estimate": "estimate"}
 CLOSE, CLOSE_ROOM = 0.9, 1.6  # of the errors after the first fix of the pad, and the room that they get
 USUAL = 0.98  # of what is drawn of errors and bands is inside the axes
 FRAME = "At the filter's own instant and in its own frame, which GPS has put somewhere."
@@ -133,7 +133,7 @@ def _drawn(record: Record, role: str, titles: tuple[str, ...], error: Track) -> 
     """Each component of an error on an axis of its own."""
     stack = Stack(titles)
     for row, values in enumerate(error.value.T, 1):
-        stack.line(row, role, f"{SAID[role]} {MINUS} {series.truth_name(record)}", error.t_s, values)
+        stack.line(row, role, f"{ROLE_WORDS[role]} {MINUS} {series.truth_name(record)}", error.t_s, values)
     return stack
 
 

@@ -133,8 +133,8 @@ def _sensor_title(name: str) -> str:
 
 def _judged(record: Record, name: str) -> str:
     """A sensor's mean NIS and verdict in words, as the record scores it or, where it does not, by the same rules."""
-    told = mapping(mapping(record.manifest.get("scores")).get("consistency")) or consistency_in(record)
-    scored = mapping(told.get(name))
+    scores = mapping(mapping(record.manifest.get("scores")).get("consistency")) or consistency_in(record)
+    scored = mapping(scores.get(name))
     if not scored:
         return "not judged: none fused in flight"
     mean, refused = float(scored.get("nis_per_dof") or 0.0), float(scored.get("refused") or 0.0)

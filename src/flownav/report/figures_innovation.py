@@ -54,8 +54,8 @@ def _offered(record: Record) -> list[str]:
     """Sensors that were offered to the filter to correct it, by the record's streams and by what was rejected."""
     names = [sensor.name.lower() for sensor in Sensor if sensor is not Sensor.IMU]
     scores = mapping(record.manifest.get("scores"))
-    told = {**mapping(scores.get("readings")), **mapping(scores.get("rejected"))}
-    return [name for name in names if name in told]
+    counts = {**mapping(scores.get("readings")), **mapping(scores.get("rejected"))}
+    return [name for name in names if name in counts]
 
 
 def _untested(record: Record, name: str) -> Panel:

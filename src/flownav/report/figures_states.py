@@ -187,8 +187,8 @@ BATTERY = {"voltage_v": "voltage (V)", "current_a": "current (A)", "remaining_pe
 
 def battery(record: Record) -> list[Panel]:
     """The battery as the log has it; none where it has no voltage."""
-    told = [name for name in BATTERY if track(record, "battery", (name,)) is not None]
-    known = [name for name in told if np.isfinite(record.tables["battery"][name]).any()]
+    present = [name for name in BATTERY if track(record, "battery", (name,)) is not None]
+    known = [name for name in present if np.isfinite(record.tables["battery"][name]).any()]
     if "voltage_v" not in known:
         return []
     stack = Stack([BATTERY[name] for name in known], row_height_px=110)

@@ -21,20 +21,20 @@ def headline(record: Record) -> str:
     off = contact.get("distance_m")
     place = "" if not _is_number(off) else f" {metres(off)} m from the pad's centre"
     if landing.get("broken"):
-        said = [f"It crashed{place}: {', '.join(map(str, landing['broken']))}."]
+        sentences = [f"It crashed{place}: {', '.join(map(str, landing['broken']))}."]
     elif landing.get("reason") or not place:
-        said = [f"It did not land{': ' + str(landing['reason']) if landing.get('reason') else ''}."]
+        sentences = [f"It did not land{': ' + str(landing['reason']) if landing.get('reason') else ''}."]
     else:
-        said = [f"It touched{place}."]
+        sentences = [f"It touched{place}."]
     sure = sure_at_touchdown_m(record) if place else None
     if sure is not None:
-        said.append(f"As it touched, the navigator was sure of its place within {metres(sure)} m ({SIGMA}).")
+        sentences.append(f"As it touched, the navigator was sure of its place within {metres(sure)} m ({SIGMA}).")
     limits: dict[str, Any] = {words: mapping(landing.get("limited_by")).get(name) for name, words in LIMITS.items()}
     known = {words: float(size) for words, size in limits.items() if _is_number(size)}
     if place and known:
         most = max(known, key=lambda words: known[words])
-        said.append(f"The largest part of that distance is due to {most} ({metres(known[most])} m).")
-    return " ".join(said)
+        sentences.append(f"The largest part of that distance is due to {most} ({metres(known[most])} m).")
+    return " ".join(sentences)
 
 
 def flown_with(record: Record) -> str:

@@ -82,7 +82,7 @@ def _side(s: Scene) -> str:
         across = course.ned_m[:, 0] * np.cos(s.along) + course.ned_m[:, 1] * np.sin(s.along)
         return np.column_stack([middle + scale * across, ground + scale * course.ned_m[:, 2]])
 
-    truth, said = at(s.truth), at(s.said)
+    truth, estimated = at(s.truth), at(s.estimated)
     half, (north, east, down) = 0.5 * s.pad_m * scale, s.three_sigma_m.T
     radii = scale * np.column_stack([np.hypot(north * np.cos(s.along), east * np.sin(s.along)), down])
     step = next((size for size in ROUND_M if scale * size >= 60.0), ROUND_M[-1])
@@ -93,7 +93,7 @@ def _side(s: Scene) -> str:
     )  # fmt: skip
     pad = f'<rect class="pad" x="{middle - half:.1f}" y="{ground:.1f}" width="{2 * half:.1f}" height="5"/>'
     moving = [
-        _moved(s.shape.side(scale), "ghost", s, said, np.degrees(-s.said.pitch)),
+        _moved(s.shape.side(scale), "ghost", s, estimated, np.degrees(-s.estimated.pitch)),
         _moved(s.shape.side(scale), "vehicle", s, truth, np.degrees(-s.truth.pitch)),
     ]
     compass = f"nose to the right, heading {np.degrees(s.along) % 360.0:.0f}\N{DEGREE SIGN}"
@@ -108,10 +108,10 @@ def _above(s: Scene) -> str:
     def at(course: Course) -> Array:
         return np.column_stack([x + scale * course.ned_m[:, 1], y - scale * course.ned_m[:, 0]])
 
-    truth, said, half = at(s.truth), at(s.said), 0.5 * s.pad_m * scale
+    truth, estimated, half = at(s.truth), at(s.estimated), 0.5 * s.pad_m * scale
     pad = f'<rect class="pad" x="{x - half:.1f}" y="{y - half:.1f}" width="{2 * half:.1f}" height="{2 * half:.1f}"/>'
     moving = [
-        _moved(s.shape.above(scale), "ghost", s, said, np.degrees(s.said.heading)),
+        _moved(s.shape.above(scale), "ghost", s, estimated, np.degrees(s.estimated.heading)),
         _moved(s.shape.above(scale), "vehicle", s, truth, np.degrees(s.truth.heading)),
     ]
     cross = _cross(x + scale * s.touch_m[1], y - scale * s.touch_m[0], 6.0)
@@ -133,7 +133,7 @@ def _close(s: Scene) -> str:
     def at(course: Course) -> Array:
         return np.column_stack([x + scale * course.ned_m[:, 1], y - scale * course.ned_m[:, 0]])
 
-    truth, said = at(s.truth), at(s.said)
+    truth, estimated = at(s.truth), at(s.estimated)
     centre = f'<path class="centre" d="M{x - 8:.1f} {y:.1f}h16M{x:.1f} {y - 8:.1f}v16"/>'
     dots = "".join(
         f'<circle class="other" cx="{x + scale * e:.1f}" cy="{y - scale * n:.1f}" r="2.5"/>' for n, e in s.others_m
@@ -144,7 +144,7 @@ def _close(s: Scene) -> str:
         f"R95 {metres(s.r95_m)} m of {s.flights} flights</text>"
     )  # fmt: skip
     spot = '<circle r="5"/>'
-    moving = [_moved(spot, "ghost", s, said, None), _moved(spot, "vehicle spot", s, truth, None)]
+    moving = [_moved(spot, "ghost", s, estimated, None), _moved(spot, "vehicle spot", s, truth, None)]
     cross = _cross(x + scale * s.touch_m[1], y - scale * s.touch_m[0], 8.0)
     late = s.ways[1].t_s > s.touch_s - CLOSE_S
     ends = [at(way)[late] for way in s.ways]
@@ -165,14 +165,14 @@ def view(number: int, wide: float, title: str, inside: str) -> str:
 
 def _ways(s: Scene, at: Placed, radii: Array) -> str:
     """The paths of truth, under it its phases in colour, and of the estimate, under it its tube of 3 sigma [px]."""
-    truth, said = map(at, s.ways)
+    truth, estimated = map(at, s.ways)
     t_s, coloured = s.ways[0].t_s, []
     for phase in s.phases:
         part = truth[(t_s >= phase.t0) & (t_s <= phase.t1)]
         if len(part) > 1:
             colour = f'style="stroke:var(--phase-{escape(phase.name)})"'
             coloured.append(f'<polyline class="phase-way" {colour} points="{_points(part)}"/>')
-    return f"{_tube(said, radii)}{''.join(coloured)}{_lines(truth, said)}"
+    return f"{_tube(estimated, radii)}{''.join(coloured)}{_lines(truth, estimated)}"
 
 
 def _tube(way: Array, radii: Array) -> str:
@@ -195,8 +195,8 @@ def _phase_key(s: Scene) -> str:
     )
 
 
-def _lines(truth: Array, said: Array) -> str:
-    return polyline("way truth", truth) + polyline("way flown", said)
+def _lines(truth: Array, estimated: Array) -> str:
+    return polyline("way truth", truth) + polyline("way flown", estimated)
 
 
 def polyline(role: str, way: Array) -> str:
@@ -248,9 +248,9 @@ def _wind_arrow(wind: tuple[float, float]) -> str:
 def scale_bar(scale: float, lengths_m: Sequence[float] = ROUND_M) -> str:
     """A bar of a round length, scale in px/m."""
     length = max((size for size in lengths_m if scale * size <= 110.0), default=lengths_m[0])
-    said = f"{100 * length:g} cm" if length < 1.0 else f"{length:g} m"
+    label = f"{100 * length:g} cm" if length < 1.0 else f"{length:g} m"
     right = f"M8 {HIGH_PX - 10}v4h{scale * length:.1f}v-4"
-    return f'<path class="arrow" d="{right}"/><text x="{12}" y="{HIGH_PX - 11}">{said}</text>'
+    return f'<path class="arrow" d="{right}"/><text x="{12}" y="{HIGH_PX - 11}">{label}</text>'
 
 
 def _key(s: Scene, tube: bool) -> str:

@@ -37,7 +37,7 @@ class Scene(NamedTuple):
     """
 
     truth: Course
-    said: Course
+    estimated: Course
     ways: tuple[Course, Course]
     phases: list[Phase]
     three_sigma_m: Array
@@ -59,8 +59,8 @@ class Scene(NamedTuple):
 def scene_of(record: Record) -> Scene | None:
     """The scene of a record; None without a touchdown, a truth and an estimate with attitude."""
     contact = mapping(mapping(mapping(record.manifest.get("scores")).get("touchdown")).get("contact"))
-    said = "flown" if has(record, "flown", (*POSITION_NED, *QUATERNION)) else "estimate"
-    known = all(has(record, name, (*POSITION_NED, *QUATERNION)) for name in ("truth", said))
+    estimated = "flown" if has(record, "flown", (*POSITION_NED, *QUATERNION)) else "estimate"
+    known = all(has(record, name, (*POSITION_NED, *QUATERNION)) for name in ("truth", estimated))
     if not known or record.manifest.get("kind") != "fly" or len(_numbers(contact, CONTACT)) < len(CONTACT):
         return None
     shape, touch_s = shape_of(record), contact["t_s"]
@@ -68,7 +68,7 @@ def scene_of(record: Record) -> Scene | None:
     truth, flown, *ways = (
         _course(record, name, np.linspace(*span, count), shape.skids_below_m)
         for count in (FRAMES, WAY_POINTS)
-        for name in ("truth", said)
+        for name in ("truth", estimated)
     )
     touch = contact["north_m"], contact["east_m"]
     pad_m = float(record.manifest.get("pad_size_m") or 0.0)
@@ -78,16 +78,16 @@ def scene_of(record: Record) -> Scene | None:
     near = [1.6 * contact["distance_m"], r95 or 0.0, 0.03]
     return Scene(
         truth, flown, (ways[0], ways[1]), phases_of(record), three_sigma(record, ways[1].t_s),
-        "autopilot's input" if said == "flown" else "estimate", touch_s, touch,
+        "autopilot's input" if estimated == "flown" else "estimate", touch_s, touch,
         float(truth.heading[-1]), min(max(0.6 * pad_m, reach), 8.0), float(np.max(-truth.ned_m[:, 2])) + shape.high_m,
         1.35 * max(near), pad_m, shape, _wind(record), _others(many), r95,
         int(_numbers(many, ("flights",)).get("flights", 1)),
     )  # fmt: skip
 
 
-def _numbers(said: Mapping[str, Any], names: Sequence[str]) -> dict[str, float]:
+def _numbers(numbers: Mapping[str, Any], names: Sequence[str]) -> dict[str, float]:
     """The finite numbers among these entries: a manifest comes from a file."""
-    found = {name: said.get(name) for name in names}
+    found = {name: numbers.get(name) for name in names}
     return {name: float(value) for name, value in found.items() if isinstance(value, int | float) and isfinite(value)}
 
 

@@ -151,7 +151,7 @@ def _dot(way: Array) -> str:
 def _words(shown: list[tuple[str, str, Track]], paths: Paths, window: Window) -> str:
     """The picture in words."""
     names = [name for _, name, _ in shown]
-    told = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    names_words = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
     path = _main(shown)
     assert path is not None
     far = sum(float(np.hypot(*(b - a))) for a, b in pairwise(_even(path, MAP_POINTS).value[:, :2]))
@@ -159,4 +159,4 @@ def _words(shown: list[tuple[str, str, Track]], paths: Paths, window: Window) ->
     more = f" and {len(paths.outages) - 3} more times" if len(paths.outages) > 3 else ""
     cut = f" GPS was withheld from {spans}{more} (broad, red)." if paths.outages else ""
     lasts = f"{window[1] - window[0]:.0f} s and some {far:.0f} m over the ground"
-    return f"The path of {lasts}, in a loop of 5 s: {told}.{cut}"
+    return f"The path of {lasts}, in a loop of 5 s: {names_words}.{cut}"

@@ -220,8 +220,8 @@ def _ground_contacts(record: Record) -> dict[str, float]:
             found["lift-off"] = float(truth["t_s"][rows[~on_ground][0]])
         if on_ground.any():
             found["touchdown"] = float(truth["t_s"][rows[on_ground][-1]])
-    told = {kind.lower() for _, _, kind, _, _ in event_rows(record)}
-    if not found and not told & {*LIFT_OFF_KINDS, *TOUCHDOWN_KINDS}:
+    kinds = {kind.lower() for _, _, kind, _, _ in event_rows(record)}
+    if not found and not kinds & {*LIFT_OFF_KINDS, *TOUCHDOWN_KINDS}:
         return _contacts_of_phases(record)
     for t_s, _, kind, _, _ in event_rows(record):
         if kind.lower() in LIFT_OFF_KINDS:

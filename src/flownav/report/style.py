@@ -154,8 +154,8 @@ def _packed(value: Any) -> Any:
         return [_packed(one) for one in value]
     if isinstance(value, np.ndarray) and value.dtype.name in TYPED:
         little = np.ascontiguousarray(value, value.dtype.newbyteorder("<"))
-        said = {"dtype": TYPED[value.dtype.name], "bdata": base64.b64encode(little.tobytes()).decode()}
-        return said | ({"shape": ", ".join(map(str, value.shape))} if value.ndim > 1 else {})
+        packed = {"dtype": TYPED[value.dtype.name], "bdata": base64.b64encode(little.tobytes()).decode()}
+        return packed | ({"shape": ", ".join(map(str, value.shape))} if value.ndim > 1 else {})
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 

@@ -100,7 +100,7 @@ def events(record: Record, phases: Sequence[Phase] = ()) -> EventTables:
     return EventTables(counted, listed, len(rows))
 
 
-TOLD_LISTED = 200
+MOST_LISTED = 200
 
 
 def autopilot_rows(record: Record, phases: Sequence[Phase] = ()) -> list[Event]:
@@ -109,7 +109,7 @@ def autopilot_rows(record: Record, phases: Sequence[Phase] = ()) -> list[Event]:
     return [
         Event(t_s, (source, kind, detail, value), phase_at(where, t_s))
         for t_s, source, kind, detail, value in series.event_rows(record) if source == "autopilot"
-    ][:TOLD_LISTED]  # fmt: skip
+    ][:MOST_LISTED]  # fmt: skip
 
 
 def groups(tree: Any) -> list[tuple[str, list[tuple[str, str]]]]:
@@ -200,14 +200,16 @@ def sensor_rows(record: Record) -> list[tuple[str, ...]]:
     for name in dict.fromkeys([*spans, *judged]):
         span, found = mapping(spans.get(name)), mapping(judged.get(name))
         span_s = f"{number(span.get('t0'), 1)} to {number(span.get('t1'), 1)}" if span else NONE
-        mean, tested, lost, said = NONE, NONE, NONE, ""
+        mean, tested, lost, verdict_words = NONE, NONE, NONE, ""
         if found:
             mean, tested = number(found.get("nis_per_dof"), 2), f"{found.get('samples') or 0:,}"
             refused = float(found.get("refused") or 0.0)
             lost = number(100.0 * refused, 1)
-            said = verdict(float(found.get("nis_per_dof") or 0.0), white=bool(found.get("white")), refused=refused)
+            verdict_words = verdict(
+                float(found.get("nis_per_dof") or 0.0), white=bool(found.get("white")), refused=refused
+            )
         title = SENSOR_TITLES.get(name, name.replace("_", " "))
-        rows.append((title, span_s, *_pace(record, name), tested, mean, lost, said))
+        rows.append((title, span_s, *_pace(record, name), tested, mean, lost, verdict_words))
     return rows
 
 

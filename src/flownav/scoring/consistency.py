@@ -145,11 +145,11 @@ def consistency_by_sensor(
     return found
 
 
-def aloft(t_s: Array, said_s: Array, landed: Array) -> NDArray[np.bool_]:
+def aloft(t_s: Array, stated_s: Array, landed: Array) -> NDArray[np.bool_]:
     """Which instants (n,) are in flight by a signal (m,) that is 1 on the ground; all where it shows no flight."""
-    if not len(said_s) or not (landed < 0.5).any():
+    if not len(stated_s) or not (landed < 0.5).any():
         return np.ones(len(t_s), bool)
-    row = np.clip(np.searchsorted(said_s, t_s, side="right") - 1, 0, len(said_s) - 1)
+    row = np.clip(np.searchsorted(stated_s, t_s, side="right") - 1, 0, len(stated_s) - 1)
     return np.asarray(landed[row] < 0.5)
 
 

@@ -31,21 +31,21 @@ def silences(streams: Mapping[Sensor, Stream], span_s: Window) -> list[str]:
     It starts late, ends early, pauses, or goes on where all others are silent. span_s: the log's first and last
     instant, on its own clock.
     """
-    heard = {s.name.lower(): stream.t_s for s, stream in streams.items() if len(stream) and s not in SELDOM}
-    start, end = _main_part(list(heard.values()), span_s)
-    allowed, said = _long(end - start), []
-    for name, t_s in heard.items():
+    arrivals = {s.name.lower(): stream.t_s for s, stream in streams.items() if len(stream) and s not in SELDOM}
+    start, end = _main_part(list(arrivals.values()), span_s)
+    allowed, notes = _long(end - start), []
+    for name, t_s in arrivals.items():
         first, last = float(t_s[0]), float(t_s[-1])
         if first - start > allowed:
-            said.append(f"{name} starts at {first:.1f} s of {end:.1f} s")
+            notes.append(f"{name} starts at {first:.1f} s of {end:.1f} s")
         if end - last > allowed:
-            said.append(f"{name} ends at {last:.1f} s of {end:.1f} s")
+            notes.append(f"{name} ends at {last:.1f} s of {end:.1f} s")
         if start - first > allowed:
-            said.append(f"{name} starts at {first:.1f} s, and most others at {start:.1f} s")
+            notes.append(f"{name} starts at {first:.1f} s, and most others at {start:.1f} s")
         if last - end > allowed:
-            said.append(f"{name} goes on to {last:.1f} s, and most others end at {end:.1f} s")
-        said += _pauses(name, t_s, allowed)
-    return said
+            notes.append(f"{name} goes on to {last:.1f} s, and most others end at {end:.1f} s")
+        notes += _pauses(name, t_s, allowed)
+    return notes
 
 
 def _main_part(times: list[Array], span_s: Window) -> Window:

@@ -123,8 +123,8 @@ def touchdown_rows(rows: Array) -> Array:
 def scores_of_flight(row: Array) -> dict[str, Any]:
     """One flight's row of scores as the JSON of `flownav fly`; what is NaN is null."""
     landing = touchdown_rows(row[None, :])
-    said = _nested(lambda column: finite_or_none(float(row[column])))
-    return said | {"touchdown": touchdown_of_flight(landing[0]), "crashed": bool(crashed(landing)[0])}
+    stated = _nested(lambda column: finite_or_none(float(row[column])))
+    return stated | {"touchdown": touchdown_of_flight(landing[0]), "crashed": bool(crashed(landing)[0])}
 
 
 def scores_of_flights(rows: Array) -> dict[str, Any]:
@@ -147,12 +147,12 @@ def _nested(number: Any) -> dict[str, Any]:
 ANGLES = ("roll", "pitch", "yaw")
 
 
-def attitude_block(said: Array, true: Array, counted: Array) -> Array:
+def attitude_block(stated: Array, true: Array, counted: Array) -> Array:
     """STATISTICS of the errors of roll, pitch and yaw [deg] of a block of flights, (lanes, 3, 4).
 
     said, true: quaternions body to earth (epochs, 4, lanes); counted (epochs, lanes) 0/1: the steps whose errors count.
     """
-    apart = euler_deg(*np.moveaxis(said, 1, 0)) - euler_deg(*np.moveaxis(true, 1, 0))
+    apart = euler_deg(*np.moveaxis(stated, 1, 0)) - euler_deg(*np.moveaxis(true, 1, 0))
     within = np.ascontiguousarray(np.moveaxis(apart - 360.0 * np.rint(apart / 360.0), 0, 1))
     counts = counted * np.isfinite(within).all(axis=1)
     found = error_statistics(within, np.zeros_like(within), counts)

@@ -74,8 +74,8 @@ def _errors(scores: Mapping[str, Any]) -> list[str]:
     states = mapping(scores.get("states"))
     axes = [_figure(mapping(states.get(axis)).get("rms_error")) for axis in "xyz"]
     heading = _figure(mapping(mapping(scores.get("attitude_deg")).get("yaw")).get("rms_error"))
-    said = [f"{length(sum(axis**2 for axis in axes if axis is not None) ** 0.5)} rms"] if None not in axes else []
-    return [*said, *([f"heading {heading:.1f} deg"] if heading is not None else [])]
+    parts = [f"{length(sum(axis**2 for axis in axes if axis is not None) ** 0.5)} rms"] if None not in axes else []
+    return [*parts, *([f"heading {heading:.1f} deg"] if heading is not None else [])]
 
 
 def _figure(value: Any) -> float | None:

@@ -54,17 +54,17 @@ def touchdown_of_flight(row: Array) -> dict[str, Any] | None:
     broken, touched = names_of(row[BROKEN]), bool(np.isfinite(row[CONTACT_DISTANCE]))
     if not row[EXPECTED] and not touched and not broken and not row[ALOFT]:
         return None
-    said: dict[str, Any] = {
+    groups: dict[str, Any] = {
         group: {name: finite_or_none(row[column_of(group, name)]) for name in names}
         for group, names in (("contact", CONTACT), ("rest", REST), ("limited_by", LIMITED_BY))
     }
     landed, times, verdict = bool(succeeded(row[None, :])[0]), int(row[GO_AROUNDS]), verdict_of(row)
     verdict = NEVER_LANDED if verdict == "unfinished" and not touched else verdict
-    for group, figures in said.items():
+    for group, figures in groups.items():
         nothing = all(figure is None for figure in figures.values())
         aloft = verdict in (NEVER_LANDED, WENT_AROUND) and group != "limited_by"
-        said[group] = None if nothing and not aloft else figures
-    return said | {"success": landed, "broken": broken, "go_arounds": times, "verdict": verdict}
+        groups[group] = None if nothing and not aloft else figures
+    return groups | {"success": landed, "broken": broken, "go_arounds": times, "verdict": verdict}
 
 
 def with_reason(scores: dict[str, Any], height_m: float, facts: Mapping[str, Any]) -> dict[str, Any]:

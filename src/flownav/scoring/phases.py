@@ -96,10 +96,10 @@ def contact_of(record: Record, t_s: Array) -> NDArray[np.bool_] | None:
     return _by_events(record, t_s) if _by_events(record, t_s) is not None else _by_range(record, t_s)
 
 
-def _held(times: Array, said: NDArray[np.bool_], t_s: Array) -> NDArray[np.bool_]:
+def _held(times: Array, contacts: NDArray[np.bool_], t_s: Array) -> NDArray[np.bool_]:
     """The last landed state reported at each instant, with breaks in contact shorter than a flutter bridged."""
     rows = np.clip(np.searchsorted(times, t_s, side="right") - 1, 0, len(times) - 1)
-    held = said[rows]
+    held = contacts[rows]
     width = round(LONGEST_CONTACT_GAP_S / GRID_S)
     for first, last in _stretches(~held):
         if last - first <= width and first > 0 and last < len(held):
@@ -110,12 +110,12 @@ def _held(times: Array, said: NDArray[np.bool_], t_s: Array) -> NDArray[np.bool_
 def _by_events(record: Record, t_s: Array) -> NDArray[np.bool_] | None:
     table = record.tables.get("events", {})
     kinds = [str(kind).lower() for kind in table.get("kind", ())]
-    said = [(float(t), kind == "touchdown") for t, kind in zip(table.get("t_s", ()), kinds, strict=False)
+    contacts = [(float(t), kind == "touchdown") for t, kind in zip(table.get("t_s", ()), kinds, strict=False)
             if kind in ("lift-off", "lift_off", "takeoff", "touchdown")]  # fmt: skip
-    if not said:
+    if not contacts:
         return None
-    down = np.full(len(t_s), not said[0][1])
-    for t, on_ground in said:
+    down = np.full(len(t_s), not contacts[0][1])
+    for t, on_ground in contacts:
         down[t_s >= t] = on_ground
     return down
 

@@ -80,20 +80,20 @@ def flight_scores(record: Record, estimate: Estimate) -> dict[str, Any]:
         raise InputError("this record does not hold what its scores need; fly it again with this flownav")
     truth = record.tables["truth"]
     t_s, states = np.asarray(truth["t_s"], float), (*POSITION_NED, *VELOCITY_BODY)
-    said, true = at_instants(estimate, states, t_s), columns_of(truth, states)
-    counted = np.asarray(judged["counted"], float) * np.isfinite(said[:, :3]).all(axis=1)
+    estimated, true = at_instants(estimate, states, t_s), columns_of(truth, states)
+    counted = np.asarray(judged["counted"], float) * np.isfinite(estimated[:, :3]).all(axis=1)
     motion = truth_in_motion(
         true[:, :3, None], true[:, 3:, None], columns_of(truth, QUATERNION)[:, :, None],
         np.asarray(truth["rate_r_rad_s"], float)[:, None], np.asarray(truth["on_ground"], float)[:, None],
         float(facts["cg_above_skid_m"]),
     )  # fmt: skip
     over_ground = motion._replace(cg_height_m=motion.cg_height_m - np.asarray(judged["ground_m"], float)[:, None])
-    error = np.zeros((len(t_s), 2, 1)) if facts["flown_on_truth"] else (said - true)[:, :2, None]
+    error = np.zeros((len(t_s), 2, 1)) if facts["flown_on_truth"] else (estimated - true)[:, :2, None]
     touched = touchdowns(
         t_s, over_ground, error, _column(judged, "pad_seen"), _column(judged, "away"), Limits(**facts["limits"]),
         float(facts["may_land_after_s"]),
     )  # fmt: skip
-    row = score_block(said[:, :, None], true[:, :, None], touched, counted[:, None])[0]
+    row = score_block(estimated[:, :, None], true[:, :, None], touched, counted[:, None])[0]
     end_m = float(over_ground.cg_height_m[-1, 0]) - float(facts["cg_above_skid_m"])
     scores = with_reason(scores_of_flight(_known(row)), end_m, facts)
     return scores | {"takeoff": _takeoff(record, facts), "attitude_deg": attitude_of(record, estimate)}
@@ -102,9 +102,9 @@ def flight_scores(record: Record, estimate: Estimate) -> dict[str, Any]:
 def attitude_of(record: Record, estimate: Estimate) -> dict[str, Any] | None:
     """Errors of an estimate's attitude against the truth of a simulated flight, as `attitude_scores` has them."""
     truth, counted = record.tables["truth"], np.asarray(record.tables["judging"]["counted"], float)
-    said = at_instants(estimate, QUATERNION, np.asarray(truth["t_s"], float))
+    estimated = at_instants(estimate, QUATERNION, np.asarray(truth["t_s"], float))
     true = columns_of(truth, QUATERNION)
-    return attitude_scores(attitude_block(said[:, :, None], true[:, :, None], counted[:, None]))
+    return attitude_scores(attitude_block(estimated[:, :, None], true[:, :, None], counted[:, None]))
 
 
 def _known(row: Array) -> Array:

@@ -207,11 +207,11 @@ def protection_of(
         "horizontal_m": _summary(levels_m[known, 0]),
         "vertical_m": _summary(levels_m[known, 1]),
         "flagged_fraction": float(flagged[known].mean()),
-        "exceeded_unsaid_fraction": None if drift is None else exceeded_unsaid(t_s, levels_m[:, 0], flagged, drift),
+        "exceeded_unsaid_fraction": None if drift is None else unwarned_share(t_s, levels_m[:, 0], flagged, drift),
     }
 
 
-def exceeded_unsaid(t_s: Array, level_m: Array, flagged: NDArray[np.bool_], drift: Drift) -> float:
+def unwarned_share(t_s: Array, level_m: Array, flagged: NDArray[np.bool_], drift: Drift) -> float:
     """The share of the truth's instants at which the error is above the newest level and no warning stands.
 
     A level that is no number protects from nothing.

@@ -22,16 +22,18 @@ def verdict(nis_per_dof: float, *, white: bool, refused: float = 0.0) -> str:
     refused: the share of its values, in flight, that lay outside the gate.
     """
     larger = nis_per_dof > MODEST_SQUARES[1]
-    said = [f"{np.sqrt(nis_per_dof):.1f} times the scatter that the filter expects"] if larger else []
-    said += [f"{100.0 * refused:.0f} % of it refused in flight"] if refused > MANY_REFUSED else []
-    if said:
-        return f"{ACT}: {', '.join(said)}"
-    said = ["less scatter than the filter expects"] if nis_per_dof < MODEST_SQUARES[0] else []
-    said += [] if white else ["its errors last"]
-    return f"{HARMLESS}: {', '.join(said)}" if said else GOOD
+    phrases = [f"{np.sqrt(nis_per_dof):.1f} times the scatter that the filter expects"] if larger else []
+    phrases += [f"{100.0 * refused:.0f} % of it refused in flight"] if refused > MANY_REFUSED else []
+    if phrases:
+        return f"{ACT}: {', '.join(phrases)}"
+    phrases = ["less scatter than the filter expects"] if nis_per_dof < MODEST_SQUARES[0] else []
+    phrases += [] if white else ["its errors last"]
+    return f"{HARMLESS}: {', '.join(phrases)}" if phrases else GOOD
 
 
 def meanings(verdicts: Iterable[str]) -> list[str]:
     """The meaning of each verdict and the action to take, a sentence for each that occurs."""
     found = list(verdicts)
-    return [f"{word}: {meaning}" for word, meaning in MEANING.items() if any(said.startswith(word) for said in found)]
+    return [
+        f"{word}: {meaning}" for word, meaning in MEANING.items() if any(phrases.startswith(word) for phrases in found)
+    ]

@@ -191,10 +191,10 @@ def touchdowns(
     could be seen or its place was noted; away (epochs, lanes) 0/1: the vehicle goes around.
     """
     block = Motion(*map(_plain, motion))
-    told = Limits(*map(float, limits))
+    limits_ = Limits(*map(float, limits))
     rows = np.empty((COLUMNS, block.on_ground.shape[1]))
     flown, seen, around = _plain(flown_error), _plain(pad_seen), _plain(away)
-    fold(_plain(t_s), block, flown, seen, around, told, float(may_land_after_s), rows)
+    fold(_plain(t_s), block, flown, seen, around, limits_, float(may_land_after_s), rows)
     return np.ascontiguousarray(rows.T)
 
 

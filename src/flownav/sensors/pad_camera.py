@@ -222,7 +222,7 @@ def inner_serves(lens: LensPose, reach_m: float, p: PadCameraParameters) -> bool
 @equation
 def read_pad_camera(
     unit: PadCameraUnit, lens: LensPose, image_rate_rad_s: float, n: PadCameraNormals, p: PadCameraParameters,
-    told: PadCameraParameters,
+    parameters: PadCameraParameters,
 ) -> PadCameraReading:  # fmt: skip
     """One frame of a lens, its height that above the pad; image_rate_rad_s: of the ground below.
 
@@ -256,7 +256,7 @@ def read_pad_camera(
     right = wrong_right if false else shrunk * fix.tan_right
     distance_m = wrong_m if false else (1.0 + unit.longer) * fix.distance_m
     there = 1.0 if false | found else 0.0
-    return stated_fix(unit, forward, right, distance_m, there, shown_m, image_rate_rad_s, told)
+    return stated_fix(unit, forward, right, distance_m, there, shown_m, image_rate_rad_s, parameters)
 
 
 @equation
@@ -268,12 +268,15 @@ def stated_fix(
     there: float,
     shown_m: float,
     image_rate_rad_s: float,
-    told: PadCameraParameters,
+    parameters: PadCameraParameters,
 ) -> PadCameraReading:
     """A fix (there: 1 where there is one) with the accuracy that the camera states of it; shown_m: the mark's reach."""
-    noise, far = angle_noise(told, shown_m, image_rate_rad_s), distance_noise(told, shown_m, image_rate_rad_s)
-    across = unit.stated * np.sqrt(noise * noise + told.boresight_rad * told.boresight_rad)
-    along = unit.stated * np.sqrt(far * far + told.scale * told.scale) * distance_m
+    noise, far = (
+        angle_noise(parameters, shown_m, image_rate_rad_s),
+        distance_noise(parameters, shown_m, image_rate_rad_s),
+    )
+    across = unit.stated * np.sqrt(noise * noise + parameters.boresight_rad * parameters.boresight_rad)
+    along = unit.stated * np.sqrt(far * far + parameters.scale * parameters.scale) * distance_m
     spread = across * across * (1.0 + forward * forward + right * right)
     return PadCameraReading(
         forward,

@@ -130,9 +130,9 @@ def step_range_sensor(
     echo = n.echo > p.echo_above
     read_m = quantised(strayed_m if echo else measured_m, p.resolution_m, p.steps_per_m)
     returned = (truth.incidence_cosine >= p.least_incidence_cosine) | echo
-    heard = returned & ((strayed_m if echo else nearest_m) <= p.ceiling_m)
-    fresh_m = clamp(read_m, p.floor_m, p.ceiling_m) if heard else p.ceiling_m
-    fresh_quality = 255.0 if heard else 0.0
+    in_reach = returned & ((strayed_m if echo else nearest_m) <= p.ceiling_m)
+    fresh_m = clamp(read_m, p.floor_m, p.ceiling_m) if in_reach else p.ceiling_m
+    fresh_quality = 255.0 if in_reach else 0.0
     repeats = held > 0.5
     working_m = state.last_m if repeats else fresh_m
     stuck = p.stuck > 0.5

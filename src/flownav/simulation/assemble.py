@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from flownav.control.design import gains_for, told_before
+from flownav.control.design import gains_for, nominal_model
 from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import path_through, rounded
-from flownav.control.learnt_model import Told
+from flownav.control.learnt_model import NominalModel
 from flownav.control.margins import margins_of
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
@@ -81,7 +81,7 @@ def assemble(scenario: Scenario) -> Setup:
     gains = _gains(scenario, vehicle, hover)
     dispersion = scenario.dispersion.entries()
     plan = _plan(scenario, vehicle, hover, gains, dispersion)
-    carried = fitted(scenario, sensor, vehicle, plan.epochs) if scenario.filter.name == "landing" else None
+    equipped = fitted(scenario, sensor, vehicle, plan.epochs) if scenario.filter.name == "landing" else None
     flight = Flight(
         plan=plan,
         vehicle=vehicle,
@@ -93,9 +93,9 @@ def assemble(scenario: Scenario) -> Setup:
         path=_path(scenario, vehicle),
         gains=gains,
         paper=_paper_filter(paper) if scenario.filter.name == "paper" else None,
-        onboard=carried.onboard if carried else None,
-        table=carried.schedule if carried else None,
-        settings=carried.settings if carried else np.zeros(0),
+        onboard=equipped.onboard if equipped else None,
+        table=equipped.schedule if equipped else None,
+        settings=equipped.settings if equipped else np.zeros(0),
         initial_variance=_initial_variance(scenario, paper),
         linear=_linear_truth(paper, hover) if scenario.truth == "linear" and isinstance(hover, Trim) else None,
         limits=touchdown_limits(file),
@@ -112,14 +112,14 @@ def assemble(scenario: Scenario) -> Setup:
         parameters["autopilot_margins"] = {
             row.loop: row.margins.finite() for row in margins_of(hover_plant(vehicle, hover), gains, NOMINAL)
         }
-    if carried:
-        parameters["sensors"] = carried.sheets.model_dump(exclude={"flow_sensor"})
-        parameters["filter"] = carried.told.settings.model_dump()
-        parameters["flow_noise"] = carried.told.noise._asdict()
-        parameters["gps_delay_s"] = float(carried.ages_s[Sensor.GPS_POSITION])
-        parameters["horizon_s"] = carried.schedule.horizon_s
+    if equipped:
+        parameters["sensors"] = equipped.sheets.model_dump(exclude={"flow_sensor"})
+        parameters["filter"] = equipped.given.settings.model_dump()
+        parameters["flow_noise"] = equipped.given.noise._asdict()
+        parameters["gps_delay_s"] = float(equipped.ages_s[Sensor.GPS_POSITION])
+        parameters["horizon_s"] = equipped.schedule.horizon_s
     inputs = tuple(path for path in (own_file, sensor_file) if path)
-    return Setup(scenario, sensor, flight, carried, hover, inputs, parameters, file, described, dispersion)
+    return Setup(scenario, sensor, flight, equipped, hover, inputs, parameters, file, described, dispersion)
 
 
 def _values_of(described: kinds.VehicleDescription) -> dict[str, Any]:
@@ -179,12 +179,12 @@ def _may_learn(scenario: Scenario, hover: kinds.AnyTrim) -> bool:
     return scenario.filter.name == "landing" and isinstance(hover, Trim)
 
 
-def _learns(scenario: Scenario, vehicle: kinds.AnyVehicle, hover: kinds.AnyTrim) -> Told | None:
+def _learns(scenario: Scenario, vehicle: kinds.AnyVehicle, hover: kinds.AnyTrim) -> NominalModel | None:
     """Beliefs about a vehicle that may learn itself; None where it may not."""
     if not _may_learn(scenario, hover) or not isinstance(hover, Trim) or isinstance(vehicle, MultirotorParameters):
         return None
     learning = scenario.autopilot.learning
-    return told_before(vehicle, hover, -1 if learning is None else round(learning.begins_s / EPOCH_S))
+    return nominal_model(vehicle, hover, -1 if learning is None else round(learning.begins_s / EPOCH_S))
 
 
 def _happens(scenario: Scenario, vehicle: kinds.AnyVehicle) -> Happens:

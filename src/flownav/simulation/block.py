@@ -47,7 +47,7 @@ class Progress(NamedTuple):
 
     taken: int
     following: int
-    heard: int
+    inertial: int
 
 
 class Buffers(NamedTuple):

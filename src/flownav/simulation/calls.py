@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from flownav.control.gains import AutopilotGains
     from flownav.control.guidance import Reference
-    from flownav.control.learnt_model import Told
+    from flownav.control.learnt_model import NominalModel
     from flownav.core.compile import Lanes, Work
     from flownav.sensors.range_sensor import RangefinderParameters
     from flownav.simulation.onboard import Onboard
@@ -28,7 +28,7 @@ def find_place(work: Work, lanes: Lanes, nav: Work) -> None: ...
 def first_gusts(work: Work, lanes: Lanes) -> None: ...
 def follow_flow(work: Work, lanes: Lanes, lens_below_cg_m: float) -> None: ...
 def follow_path(
-    work: Work, lanes: Lanes, may_land: float, reference: Reference, gains: AutopilotGains, learns: Told | None
+    work: Work, lanes: Lanes, may_land: float, reference: Reference, gains: AutopilotGains, learns: NominalModel | None
 ) -> None: ...
 def hand_to_autopilot(
     work: Work, lanes: Lanes, waiting: bool, *, at_start: bool, reference: Reference, nav: Work
@@ -58,6 +58,6 @@ def steer_blades(
     gains: AutopilotGains,
     linear: LinearTruth | None,
     onboard: Onboard | None,
-    learns: Told | None,
+    learns: NominalModel | None,
 ) -> None: ...
 def true_imu(work: Work, lanes: Lanes, period_s: float) -> None: ...

@@ -11,13 +11,13 @@ import numpy as np
 
 from flownav.control.learning import Learnt
 from flownav.control.learnt_gains import LoopGains
-from flownav.core.compile import LANES, ONE_LANE, announce_compilation, compile_beside
+from flownav.core.compile import LANES, ONE_LANE, announce_compilation, compile_in_parallel
 from flownav.core.measurement import Array, Sensor
+from flownav.navigation.kernel_settings import carries_lag
 from flownav.navigation.memory import new_work
 from flownav.navigation.packed import load_flow_settings
 from flownav.navigation.take import navigator_unit
 from flownav.navigation.tape import COMPONENTS, Tape, empty_tape, room_of
-from flownav.navigation.told import carries_lag
 from flownav.simulation import layout
 from flownav.simulation.block import Block, Buffers, Noise, plain_noise
 from flownav.simulation.ensemble import Ensemble, believed
@@ -29,8 +29,8 @@ from flownav.simulation.truth import SensorFault, Truth, packed_truth
 
 Result = TypeVar("Result")
 
-SAID_OF_ONE = "the simulator, once, about 30 s"
-SAID_OF_MANY = "the simulator of many flights, once, about 40 s"
+COMPILING_ONE = "the simulator, once, about 30 s"
+COMPILING_MANY = "the simulator of many flights, once, about 40 s"
 BLOCKS_AHEAD = 4  # blocks that each thread may be ahead of who takes their results
 
 
@@ -102,17 +102,19 @@ def fly_into(
         followed = len(b.tape.estimate) > 0 or flight.plan.minds_faults  # nobody else reads levels or suspicions
         b.nav[:] = new_work(lanes, faults=followed)
     b.tape.used[:] = 0
-    told = flight, packed_truth(truths), Block(b.work, lanes, seed, first, noise), b
+    arguments = flight, packed_truth(truths), Block(b.work, lanes, seed, first, noise), b
     take: Any = 0
     if instead.take is not None:
         take = instead.take
     elif flight.onboard is not None:
         unit = navigator_unit(lanes, carries_lag(load_flow_settings(flight.settings)))
         if compiled:
-            compile_beside(unit, fly_block, *told, take, whole=SAID_OF_ONE if len(lanes) == 1 else SAID_OF_MANY)
+            compile_in_parallel(
+                unit, fly_block, *arguments, take, whole=COMPILING_ONE if len(lanes) == 1 else COMPILING_MANY
+            )
         take = unit.address if compiled else unit.python
     fly: Any = fly_block if compiled else cast(Any, fly_block).py_func
-    fly(*told, take)
+    fly(*arguments, take)
 
 
 def truths_of(

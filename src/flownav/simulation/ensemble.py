@@ -106,7 +106,7 @@ class Ensemble:
         self.contents = {name: model.model_dump() for name, model in self.models.items()}
         self.base = believed(flight)
         self.reach = {f"vehicle.{entry.key}": entry.uncertainty for entry in described.entries}
-        self.entries = {name: one for name, one in dispersion.items() if self._carried(name)}
+        self.entries = {name: one for name, one in dispersion.items() if self._is_fitted(name)}
         self.frozen = {name: self._checked(name, one) for name, one in self.entries.items()}
         self._chunk = lru_cache(maxsize=16)(self._drawn)
 
@@ -146,10 +146,10 @@ class Ensemble:
 
     def numbers(self, name: str, shares: Array) -> Array:
         """A dispersed number at these shares of its distribution, in (0, 1), in the unit of its name."""
-        entry, told = self.entries[name], self.believed_of(name)
-        below, above = self._reach(name, told) if entry.mode == "uncertainty" else (0.0, 0.0)
+        entry, believed_value = self.entries[name], self.believed_of(name)
+        below, above = self._reach(name, believed_value) if entry.mode == "uncertainty" else (0.0, 0.0)
         draws = self.frozen[name].ppf(shares)
-        return np.array([drawn(entry.mode, float(draw), told, below, above) for draw in draws])
+        return np.array([drawn(entry.mode, float(draw), believed_value, below, above) for draw in draws])
 
     def _truth(self, flight: int, values: Mapping[str, float]) -> Truth:
         """One flight's truth: parts that the drawn numbers touch are built anew, the rest is as believed."""
@@ -189,7 +189,7 @@ class Ensemble:
         }
         return PUNCTUAL._replace(**late)
 
-    def _carried(self, name: str) -> bool:
+    def _is_fitted(self, name: str) -> bool:
         """Whether the vehicle has the part of an entry; a part of another kind, or a known sensor, is passed over."""
         source = name.partition(".")[0]
         if source == "vehicle" and name.split(".")[1] in OF_A_KIND - set(self.contents["vehicle"]):
@@ -207,9 +207,9 @@ class Ensemble:
         parts = key.split(".")
         if any(part in SHARED for part in parts) or (key == "latency_s" and source not in LATE):
             raise self._wrong(name, "is the same for all flights of a scenario")
-        told = self.believed_of(name)
+        believed_value = self.believed_of(name)
         if entry.mode == "uncertainty":
-            self._reach(name, told)
+            self._reach(name, believed_value)
         try:
             return entry.frozen()
         except ValueError as error:
@@ -228,14 +228,18 @@ class Ensemble:
             raise self._wrong(name, "is no number of the datasheet")
         return float(inside)
 
-    def _reach(self, name: str, told: float) -> tuple[float, float]:
+    def _reach(self, name: str, believed_value: float) -> tuple[float, float]:
         """How far below and above its value the uncertainty that the vehicle's file states reaches."""
         stated = self.reach.get(name, "")
         if not stated:
             raise self._wrong(name, 'mode = "uncertainty": the vehicle\'s file states none there')
         low, between, high = stated.partition("..")
         try:
-            return (told - float(low), float(high) - told) if between else (float(stated), float(stated))
+            return (
+                (believed_value - float(low), float(high) - believed_value)
+                if between
+                else (float(stated), float(stated))
+            )
         except ValueError:
             raise self._wrong(name, f'its uncertainty "{stated}" is neither a number nor low..high') from None
 

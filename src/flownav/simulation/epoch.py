@@ -9,7 +9,7 @@ from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import Knowledge, Reference
 from flownav.control.learning import Stir
 from flownav.control.learnt_gains import LoopGains, gains_with
-from flownav.control.learnt_model import Told
+from flownav.control.learnt_model import NominalModel
 from flownav.core.compile import Lanes, Work, equation, invoke, procedure, replacing
 from flownav.core.frames import GRAVITY_M_S2, Quaternion, quaternion_product, rotation_from_quaternion
 from flownav.core.measurement import Sensor
@@ -20,8 +20,7 @@ from flownav.sensors.gps_ins import GpsInsErrors, attitude_with_error
 from flownav.sensors.range_sensor import slant_range
 from flownav.simulation import calls
 from flownav.simulation.block import Block, Progress
-from flownav.simulation.carriage import INERTIAL_FAULT, read_inertial
-from flownav.simulation.failing import Taken, strike
+from flownav.simulation.fault_injection import Taken, strike
 from flownav.simulation.layout import PAPERS, PLANT
 from flownav.simulation.navigating import Timetable, inertial_row, keep_inertial
 from flownav.simulation.onboard import Onboard
@@ -37,6 +36,7 @@ from flownav.simulation.plan import (
 from flownav.simulation.plant import LinearTruth, linear_step, observe_vehicle, step_vehicle
 from flownav.simulation.records import AttitudeError, Estimated, Felt, Home, Landed, Loads, PaperInput
 from flownav.simulation.sensing import EPOCH_S, lens_height, true_imu
+from flownav.simulation.sensor_loops import INERTIAL_FAULT, read_inertial
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.state import Around, Controls, HelicopterState
 
@@ -44,15 +44,15 @@ over_home = replacing(Estimate, "pos_n", "pos_e", "pos_d")
 
 
 @PLANT.on_lanes(calls.estimate_for_autopilot)
-def estimate_for_autopilot(state: HelicopterState, said: Estimated, felt: Felt, *, on_truth: bool) -> Estimate:
+def estimate_for_autopilot(state: HelicopterState, stated: Estimated, felt: Felt, *, on_truth: bool) -> Estimate:
     """The outer loop's feedback: the filter's estimate or the truth, and the specific force read by the IMU."""
     return Estimate(
-        state.pos_n if on_truth else said.pos_n_m,
-        state.pos_e if on_truth else said.pos_e_m,
-        state.pos_d if on_truth else said.pos_d_m,
-        state.u if on_truth else said.vel_u_m_s,
-        state.v if on_truth else said.vel_v_m_s,
-        state.w if on_truth else said.vel_w_m_s,
+        state.pos_n if on_truth else stated.pos_n_m,
+        state.pos_e if on_truth else stated.pos_e_m,
+        state.pos_d if on_truth else stated.pos_d_m,
+        state.u if on_truth else stated.vel_u_m_s,
+        state.v if on_truth else stated.vel_v_m_s,
+        state.w if on_truth else stated.vel_w_m_s,
         felt.mean_x_m_s2,
         felt.mean_y_m_s2,
         felt.mean_z_m_s2,
@@ -97,17 +97,17 @@ def mind_skids(
 
 @PLANT.on_lanes(calls.follow_path)
 def follow_path(
-    before: AutopilotState, estimate: Estimate, home: Home, said: Estimated, known: Knowledge, loops: LoopGains, *,
-    may_land: float, reference: Reference, gains: AutopilotGains, learns: Told | None,
+    before: AutopilotState, estimate: Estimate, home: Home, stated: Estimated, known: Knowledge, loops: LoopGains, *,
+    may_land: float, reference: Reference, gains: AutopilotGains, learns: NominalModel | None,
 ) -> AutopilotState:  # fmt: skip
     """The outer loop, at the attitude by the filter or the INS."""
     relative = over_home(
         estimate, pos_n=estimate.pos_n - home.north_m, pos_e=estimate.pos_e - home.east_m,
         pos_d=estimate.pos_d - home.down_m,
     )  # fmt: skip
-    rotation = rotation_from_quaternion(said.qw, said.qx, said.qy, said.qz)
-    told = gains if learns is None else gains_with(gains, loops)
-    return outer_loop(before, reference, relative, known, rotation, told, may_land, EPOCH_S)
+    rotation = rotation_from_quaternion(stated.qw, stated.qx, stated.qy, stated.qz)
+    gains_now = gains if learns is None else gains_with(gains, loops)
+    return outer_loop(before, reference, relative, known, rotation, gains_now, may_land, EPOCH_S)
 
 
 @PLANT.on_lanes(calls.note_inputs)
@@ -141,7 +141,7 @@ class Steered(NamedTuple):
 def steer_blades(
     state: HelicopterState, before: AutopilotState, errors: GpsInsErrors, error: AttitudeError, loops: LoopGains,
     stir: Stir, around: Around, controls: Controls, *,
-    gains: AutopilotGains, linear: LinearTruth | None, onboard: Onboard | None, learns: Told | None,
+    gains: AutopilotGains, linear: LinearTruth | None, onboard: Onboard | None, learns: NominalModel | None,
 ) -> Steered:  # fmt: skip
     """The attitude loop: blade angles for the next 4 ms, on the flown attitude and the flybarless unit's gyros."""
     if onboard is None:
@@ -149,8 +149,8 @@ def steer_blades(
     else:
         qw, qx, qy, qz = own_attitude(state, error)
     rotation = rotation_from_quaternion(qw, qx, qy, qz)
-    told = gains if learns is None else gains_with(gains, loops)
-    after, lon, lat, col, ped = inner_loop(before, rotation, state.p, state.q, state.r, told, ATTITUDE_S)
+    gains_now = gains if learns is None else gains_with(gains, loops)
+    after, lon, lat, col, ped = inner_loop(before, rotation, state.p, state.q, state.r, gains_now, ATTITUDE_S)
     if linear is not None:
         ped = pedal_sideways(after, gains, linear)
     if around.tail_stuck > 0.0:
@@ -269,7 +269,7 @@ def hear(b: Block, onboard: Onboard, table: Timetable, epoch: int, at: Progress,
     if fails is not None:
         t_s = epoch * EPOCH_S + (part + 1) * onboard.inertial_steps * PHYSICS_S
         strike(work, lanes, b.seed, b.first, Taken(epoch, t_s, slot, Sensor.IMU, INERTIAL_FAULT + 3 * part, 0))
-    keep_inertial(work, lanes, slot, inertial_row=inertial_row(at.heard + part, period_s, table))
+    keep_inertial(work, lanes, slot, inertial_row=inertial_row(at.inertial + part, period_s, table))
     feel(work, lanes, part, parts=inertial_parts(onboard), slot=slot)
 
 

@@ -19,15 +19,14 @@ from pydantic import create_model
 
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array, Sensor
+from flownav.navigation.kernel_settings import FROM_MAG, Equipment
 from flownav.navigation.packed import pack
-from flownav.navigation.settings_of import Told, settings_of
-from flownav.navigation.told import FROM_MAG, Equipment
+from flownav.navigation.settings_of import GivenSettings, settings_of
 from flownav.sensors.datasheet import FlowSensor, needs_lag_states
 from flownav.sensors.flow import FlowParameters
 from flownav.sensors.magnetometer import MagneticField
 from flownav.sensors.sheet import Lever, SensorSheet
 from flownav.sensors.sheets import SensorSheets
-from flownav.simulation.carried import BLADES, CarriedSensor, Carrier
 from flownav.simulation.navigating import Timetable
 from flownav.simulation.onboard import (
     ALWAYS,
@@ -41,7 +40,8 @@ from flownav.simulation.onboard import (
     clock_of,
 )
 from flownav.simulation.scenario import Scenario
-from flownav.simulation.truth import CARRIED, Carried
+from flownav.simulation.sensor_table import BLADES, Carrier, SensorRow
+from flownav.simulation.truth import SENSOR_TABLE, Carried
 from flownav.vehicle.kinds import AnyVehicle, rotor_facts
 
 START_WAIT_S = 10.0  # the navigator's default start_wait_s
@@ -56,7 +56,7 @@ class Fitted(NamedTuple):
 
     onboard: Onboard
     schedule: Timetable
-    told: Told
+    given: GivenSettings
     equipment: Equipment
     settings: Array
     sheets: SensorSheets
@@ -71,17 +71,17 @@ def fitted(scenario: Scenario, flow_sensor: FlowSensor, vehicle: AnyVehicle, epo
     timing = timing_of(sheets, flow_sensor)
     schedule = schedule_of(epochs, onboard, timing)
     rotor_hz = rotor_facts(vehicle).speed_rad_s / (2.0 * math.pi)
-    told = settings_of(flow_sensor, sheets, flow_noise_stated=True, rotor_hz=(rotor_hz, BLADES * rotor_hz))
+    given = settings_of(flow_sensor, sheets, flow_noise_stated=True, rotor_hz=(rotor_hz, BLADES * rotor_hz))
     declination_rad = math.radians(sheets.magnetic_field.declination_deg)
     equipment = Equipment(True, False, FROM_MAG, True, START_WAIT_S, declination_rad)
-    settings = packed(told, equipment)
-    return Fitted(onboard, schedule, told, equipment, settings, sheets, timing, ages_of(timing))
+    settings = packed(given, equipment)
+    return Fitted(onboard, schedule, given, equipment, settings, sheets, timing, ages_of(timing))
 
 
-def packed(told: Told, equipment: Equipment) -> Array:
+def packed(given: GivenSettings, equipment: Equipment) -> Array:
     """The navigator's settings, as its kernels take them."""
-    sigma = told.settings.start_sigma(has_heading=True, compass=True)
-    return pack(told.settings.settings(equipment, told.noise), sigma)
+    sigma = given.settings.start_sigma(has_heading=True, compass=True)
+    return pack(given.settings.settings(equipment, given.noise), sigma)
 
 
 def ages_of(timing: dict[Sensor, Timing]) -> Array:
@@ -93,19 +93,19 @@ def ages_of(timing: dict[Sensor, Timing]) -> Array:
 
 
 def refitted(
-    carried: Fitted, epochs: int, *, told: Told | None = None, onboard: Onboard | None = None,
+    fitted_: Fitted, epochs: int, *, given: GivenSettings | None = None, onboard: Onboard | None = None,
     stated: dict[Sensor, Timing] | None = None,
 ) -> Fitted:  # fmt: skip
     """The same vehicle with other settings of its navigator, or other sensors; what is None stays.
 
     stated: ages of readings as the navigator takes them; the true ages stay.
     """
-    told, onboard, stated = told or carried.told, onboard or carried.onboard, stated or carried.timing
-    return carried._replace(
+    given, onboard, stated = given or fitted_.given, onboard or fitted_.onboard, stated or fitted_.timing
+    return fitted_._replace(
         onboard=onboard,
-        schedule=schedule_of(epochs, onboard, carried.timing, stated),
-        told=told,
-        settings=packed(told, carried.equipment),
+        schedule=schedule_of(epochs, onboard, fitted_.timing, stated),
+        given=given,
+        settings=packed(given, fitted_.equipment),
         ages_s=ages_of(stated),
     )
 
@@ -114,21 +114,21 @@ def refitted(
 def sheets_of(scenario: Scenario, flow_sensor: FlowSensor, vehicle: AnyVehicle) -> SensorSheets:
     """Every sheet as the scenario wants it, where it names one or one ships. InputError as the sheets' loaders."""
     lens_down_m = vehicle.cg_above_skid_m - scenario.vehicle.lens_above_skid_m
-    files = {one.name: getattr(scenario.sensors, one.name) for one in CARRIED}
+    files = {one.name: getattr(scenario.sensors, one.name) for one in SENSOR_TABLE}
     sheets = {
         one.name: one.wanted(scenario, one.sheet.read(files[one.name]), lens_down_m)
-        for one in CARRIED
+        for one in SENSOR_TABLE
         if files[one.name] or one.sheet.shipped_file
     }
-    return CarriedSheets.model_construct(**sheets, flow_sensor=flow_sensor, magnetic_field=MagneticField())
+    return TableSheets.model_construct(**sheets, flow_sensor=flow_sensor, magnetic_field=MagneticField())
 
 
-def carried_sheets() -> type[SensorSheets]:
+def sheets_of_table() -> type[SensorSheets]:
     """The model of all sheets: those that the navigator may use, and the other sensors that are carried."""
     others: dict[str, Any] = {
-        one.name: (one.sheet | None, None) for one in CARRIED if one.name not in SensorSheets.model_fields
+        one.name: (one.sheet | None, None) for one in SENSOR_TABLE if one.name not in SensorSheets.model_fields
     }
-    return create_model("CarriedSheets", __base__=SensorSheets, **others) if others else SensorSheets
+    return create_model("TableSheets", __base__=SensorSheets, **others) if others else SensorSheets
 
 
 # -- equations' parameters --------------------------------------------------------------------------------------
@@ -137,7 +137,7 @@ def onboard_of(scenario: Scenario, sheets: SensorSheets, flow: FlowParameters, v
     rotor = rotor_facts(vehicle)
     on = Carrier(vehicle, rotor, sheets.magnetic_field)
     return Onboard(
-        carried=Carried(*(fitting_of(scenario, one, getattr(sheets, one.name), on) for one in CARRIED)),
+        carried=Carried(*(fitting_of(scenario, one, getattr(sheets, one.name), on) for one in SENSOR_TABLE)),
         inertial_steps=round(1.0 / (float(sheets.inertial.rate_hz) * PHYSICS_PERIOD_S)),
         flow=flow._replace(sonar_floor_m=0.0, sonar_lag_s=0.0, rotation_leak=0.0),
         pad_seen=np.zeros(0),
@@ -147,7 +147,7 @@ def onboard_of(scenario: Scenario, sheets: SensorSheets, flow: FlowParameters, v
     )
 
 
-def fitting_of(scenario: Scenario, one: CarriedSensor, sheet: SensorSheet | None, on: Carrier) -> Fitting:
+def fitting_of(scenario: Scenario, one: SensorRow, sheet: SensorSheet | None, on: Carrier) -> Fitting:
     """One sensor by its sheet; where the vehicle has none, zeros and a clock that never comes."""
     if sheet is None:
         nothing = one.parameters(*[0.0] * len(one.parameters._fields))
@@ -170,9 +170,9 @@ def timing_of(sheets: SensorSheets, flow_sensor: FlowSensor) -> dict[Sensor, Tim
     """
     found: dict[Sensor, Timing] = {Sensor.IMU: Timing(0.0, float(sheets.inertial.latency_s), 0.0)}
     lag_s = 0.0 if needs_lag_states(flow_sensor) else flow_sensor.dynamics.delay_s
-    for one in CARRIED:
+    for one in SENSOR_TABLE:
         sheet = getattr(sheets, one.name)
-        for kind in [said.kind for said in one.says] if sheet is not None and one.on_epochs else []:
+        for kind in [output.kind for output in one.says] if sheet is not None and one.on_epochs else []:
             lag = lag_s if kind == Sensor.FLOW_RATE else 0.0
             age = Timing(lag, float(sheet.latency_s), float(sheet.jitter_s))
             if found.setdefault(kind, age) != age:
@@ -180,7 +180,7 @@ def timing_of(sheets: SensorSheets, flow_sensor: FlowSensor) -> dict[Sensor, Tim
     return found
 
 
-CarriedSheets = carried_sheets()
+TableSheets = sheets_of_table()
 
 
 JITTER_KEY = 20251121  # of the timetable's own generator: it is part of the scenario, not of a seed
@@ -249,10 +249,10 @@ def clocks(sensors: Onboard) -> list[tuple[Sensor, int, Clock]]:
     Its kind, the key of its jitter, and its clock. All readings of a sensor at one time arrive together.
     """
     found, seen = [], Counter[Sensor]()
-    for sensor in CARRIED:
+    for sensor in SENSOR_TABLE:
         clock, first = getattr(sensors.carried, sensor.name).clock, sensor.says[0].kind
         key = int(first) + KEYS_A_KIND * seen[first]
         seen[first] += 1
         if sensor.on_epochs:
-            found += [(said.kind, key, clock) for said in sensor.says[: clock.fitted]]
+            found += [(output.kind, key, clock) for output in sensor.says[: clock.fitted]]
     return found

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from flownav.control.autopilot import grounded, hovering
 from flownav.control.guidance import Reference, reference_at
-from flownav.control.learnt_gains import as_told
+from flownav.control.learnt_gains import loop_gains_of
 from flownav.core.compile import Lanes, Work, equation, invoke, kernel, pointer, replacing
 from flownav.estimation import paper_filter
 from flownav.estimation.paper_filter import STATES, PaperModel, start
@@ -21,7 +21,6 @@ from flownav.navigation.tape import output_of
 from flownav.sensors.gps_ins import NavSolution
 from flownav.simulation import calls, layout, navigating
 from flownav.simulation.block import Aboard, Block, Buffers, Progress, key_lanes, put_start
-from flownav.simulation.carriage import draw_units, sample, start_onboard
 from flownav.simulation.epoch import (
     advance,
     advance_sensing,
@@ -39,6 +38,7 @@ from flownav.simulation.plan import NOTHING, PHYSICS_S, START_STEP, Flight, OwnP
 from flownav.simulation.plant import observe_vehicle, place
 from flownav.simulation.records import Estimated, Measured, PaperState, PaperVariance, Spread
 from flownav.simulation.sensing import EPOCH_S, draw_epoch, sense, start_sensors
+from flownav.simulation.sensor_loops import draw_units, sample, start_onboard
 from flownav.simulation.surroundings import Runs, draw_recirculation, slow_servos, start_surroundings, surround
 from flownav.vehicle.state import HelicopterState
 
@@ -63,7 +63,7 @@ def start_block(b: Block, flight: Flight, onboard: Onboard | None) -> None:
         place(work, lanes, lane, flight.plan.start, flight.rotors)
         autopilot = grounded(flight.gains) if flight.plan.starts_on_ground else hovering(flight.gains)
         store_autopilot(work, lanes, lane, autopilot)
-        store_loop_gains(work, lanes, lane, as_told(flight.gains))
+        store_loop_gains(work, lanes, lane, loop_gains_of(flight.gains))
     start_surroundings(work, lanes, flight.rotors)
     observe_start(work, lanes, flight, onboard, flight.own)
     start_sensors(work, lanes, flight.sensors)
@@ -147,8 +147,8 @@ def decide_navigated(
     taken = sample(work, lanes, b.seed, b.first, epoch, table.slots, at.taken, onboard, flight.fails)
     navigating.note_truth(work, lanes, navigating.truth_row(epoch, table))
     following = navigating.feed_due(work, lanes, epoch, at.following, aboard, table)
-    ahead = ahead if at.heard >= ahead else at.heard
-    navigating.carry_ahead(work, nav, lanes, at.heard, ahead, onboard.inertial_steps * PHYSICS_S, table)
+    ahead = ahead if at.inertial >= ahead else at.inertial
+    navigating.carry_ahead(work, nav, lanes, at.inertial, ahead, onboard.inertial_steps * PHYSICS_S, table)
     reached, then = epoch >= table.horizon_epochs, navigating.truth_row(epoch - table.horizon_epochs, table)
     navigating.compare_at_horizon(work, lanes, reached, nav=nav, truth_row=then)
     navigating.note_normalised_error(work, nav, lanes, reached, then)
@@ -161,7 +161,7 @@ def decide_navigated(
     estimate_for_autopilot(work, lanes, flight.plan.fly_on_truth)
     learn(work, lanes, epoch, flight.gains, flight.learns)
     command(work, lanes, t_s, reference, flight, onboard)
-    return Progress(taken, following, at.heard), reference
+    return Progress(taken, following, at.inertial), reference
 
 
 def epochs_navigated(note: Callable[..., None]) -> Callable[..., None]:
@@ -180,7 +180,7 @@ def epochs_navigated(note: Callable[..., None]) -> Callable[..., None]:
             at, reference = decide_navigated(b, aboard, flight, onboard, table, epoch, at)
             note(b.work, b.lanes, epoch, reference, flight, onboard, into)
             advance_sensing(b, flight, onboard, table, epoch, at, flight.own)
-            at = Progress(at.taken + parts, at.following, at.heard + parts)
+            at = Progress(at.taken + parts, at.following, at.inertial + parts)
 
     return fly_epochs
 
@@ -283,16 +283,16 @@ class Stated(NamedTuple):
 
 
 @PLANT.on_lanes(calls.say_state)
-def say_state(said: Estimated, x: PaperState, variance: PaperVariance) -> Stated:
+def say_state(stated: Estimated, x: PaperState, variance: PaperVariance) -> Stated:
     """The estimate is the state."""
     estimated = with_motion(
-        said, pos_n_m=x.pos_n_m, pos_e_m=x.pos_e_m, pos_d_m=x.pos_d_m, vel_u_m_s=x.vel_u_m_s, vel_v_m_s=x.vel_v_m_s,
+        stated, pos_n_m=x.pos_n_m, pos_e_m=x.pos_e_m, pos_d_m=x.pos_d_m, vel_u_m_s=x.vel_u_m_s, vel_v_m_s=x.vel_v_m_s,
         vel_w_m_s=x.vel_w_m_s,
     )  # fmt: skip
     return Stated(estimated, Spread(*variance))
 
 
 @PLANT.on_lanes(calls.say_ins_attitude)
-def say_ins_attitude(said: Estimated, gps: NavSolution) -> Estimated:
+def say_ins_attitude(stated: Estimated, gps: NavSolution) -> Estimated:
     """A filter without an attitude of its own reports the INS's."""
-    return with_attitude(said, qw=gps.qw, qx=gps.qx, qy=gps.qy, qz=gps.qz)
+    return with_attitude(stated, qw=gps.qw, qx=gps.qx, qy=gps.qy, qz=gps.qz)

@@ -60,8 +60,8 @@ def _learnt(setup: Setup, flown: Flown, lane: int) -> dict[str, Any]:
 
     The margins that these keep are `control.learnt_margins.margins_of_record`.
     """
-    told = setup.flight.learns
-    if told is None or told.begins < 0 or not flown.learnt:
+    nominal = setup.flight.learns
+    if nominal is None or nominal.begins < 0 or not flown.learnt:
         return {}
     learnt, gains = flown.learnt[lane]
     facts: dict[str, Any] = {"verdict": VERDICTS[int(learnt.state)], "tries": int(learnt.tries)}

@@ -85,6 +85,6 @@ def inverse_of(name: str, shapes: Mapping[str, float], loc: float, scale: float)
     family = FAMILIES.get(name)
     if family is None or sorted(family.shapes) != sorted(shapes):
         return None
-    told = tuple(float(shapes[key]) for key in family.shapes)
-    found = Inverse(family, told, float(loc), float(scale)) if family.holds(*told) and scale > 0.0 else None
+    shape = tuple(float(shapes[key]) for key in family.shapes)
+    found = Inverse(family, shape, float(loc), float(scale)) if family.holds(*shape) and scale > 0.0 else None
     return found if found is not None and np.isfinite(found.ppf(0.5)) else None

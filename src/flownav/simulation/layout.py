@@ -20,8 +20,8 @@ from flownav.sensors.inertial import ImuReading
 from flownav.sensors.range_sensor import RangefinderState, RangeReading
 from flownav.simulation import records
 from flownav.simulation.ground import RecirculationState
-from flownav.simulation.seeing import attitude_of
-from flownav.simulation.truth import CARRIED, PARTS, SIZES
+from flownav.simulation.truth import PARTS, SENSOR_TABLE, SIZES
+from flownav.simulation.views import attitude_of
 from flownav.simulation.wind import WindNormals, WindState
 from flownav.vehicle.parameters import MultirotorParameters
 from flownav.vehicle.state import Around, Controls, HelicopterState, Inflow, MultirotorState, Six
@@ -38,7 +38,7 @@ def in_pairs(record: Any) -> int:
 
 
 PLANT = _rows = Layout()
-BY_CHANNEL = sorted(CARRIED, key=lambda sensor: sensor.channels.reading)  # the order of their rows
+BY_CHANNEL = sorted(SENSOR_TABLE, key=lambda sensor: sensor.channels.reading)  # the order of their rows
 
 # what this flight's vehicle, wind and sensors are (`simulation.truth`)
 AS_IS = {part: _rows.take(SIZES[part]) for part in PARTS}

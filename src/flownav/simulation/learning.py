@@ -27,7 +27,7 @@ from flownav.control.learning import (
     with_course,
 )
 from flownav.control.learnt_gains import judged, shaped
-from flownav.control.learnt_model import Told
+from flownav.control.learnt_model import NominalModel
 from flownav.core.compile import Lanes, Work, equation, magnitude, procedure
 from flownav.core.frames import rotation_from_quaternion
 from flownav.simulation import calls, layout
@@ -37,13 +37,13 @@ from flownav.simulation.records import Estimated, Home
 
 
 @equation
-def learn(work: Work, lanes: Lanes, epoch: int, gains: AutopilotGains, told: Told | None) -> None:
+def learn(work: Work, lanes: Lanes, epoch: int, gains: AutopilotGains, nominal: NominalModel | None) -> None:
     """Add an epoch to the learning, where a vehicle may be learnt."""
-    if told is not None:  # noqa: SIM102  (None is a type here: its code is not compiled)
-        if told.begins >= 0 and epoch >= told.begins:
-            mind(work, lanes, gains, epoch - told.begins)
+    if nominal is not None:  # noqa: SIM102  (None is a type here: its code is not compiled)
+        if nominal.begins >= 0 and epoch >= nominal.begins:
+            mind(work, lanes, gains, epoch - nominal.begins)
             for lane in range(len(lanes)):
-                stir_lane(work, lanes, lane, told)
+                stir_lane(work, lanes, lane, nominal)
 
 
 class Minded(NamedTuple):
@@ -55,17 +55,17 @@ class Minded(NamedTuple):
 
 @PLANT.on_lanes(calls.mind)
 def mind(
-    before: Learnt, autopilot: AutopilotState, said: Estimated, home: Home, known: Knowledge, *, gains: AutopilotGains,
+    before: Learnt, autopilot: AutopilotState, now: Estimated, home: Home, known: Knowledge, *, gains: AutopilotGains,
     passed: int,
 ) -> Minded:  # fmt: skip
     """Whether it goes on: in flight, not low, not going around, near the commanded tilt; else it waits.
 
     passed: epochs since it was to begin.
     """
-    rotation = rotation_from_quaternion(said.qw, said.qx, said.qy, said.qz)
+    rotation = rotation_from_quaternion(now.qw, now.qx, now.qy, now.qz)
     off_pitch, off_roll = autopilot.pitch_sine + rotation[6], autopilot.roll_sine - rotation[7]
     near = magnitude(off_pitch) < STEEPEST and magnitude(off_roll) < STEEPEST
-    low = known.ground_found > 0.0 and gains.pad_pos_d_m - said.pos_d_m + home.down_m < LOWEST_M
+    low = known.ground_found > 0.0 and gains.pad_pos_d_m - now.pos_d_m + home.down_m < LOWEST_M
     well = autopilot.flying > 0.0 and autopilot.away == 0.0 and near and not low
     breaks = before.state == 0.0 and before.since > 0.0 and not well
     waits = breaks or not well
@@ -78,7 +78,7 @@ def mind(
 
 
 @procedure
-def stir_lane(work: Work, lanes: Lanes, lane: int, told: Told) -> None:
+def stir_lane(work: Work, lanes: Lanes, lane: int, nominal: NominalModel) -> None:
     """One lane's epoch of the stir. Note the last one's measurement, and command the next."""
     learnt = layout.load_learnt(work, lanes, lane)
     since = int(learnt.since) - 1
@@ -93,7 +93,7 @@ def stir_lane(work: Work, lanes: Lanes, lane: int, told: Told) -> None:
             note_line(work, lanes, layout.SPECTRA, since - SETTLE_EPOCHS - 1, rates, lane, asked)
         stirred = since - SETTLE_EPOCHS
         if stirred > 0 and stirred % (PERIODS * STIR_EPOCHS) == 0:
-            conclude(work, lanes, lane, told, stirred // STIR_EPOCHS)
+            conclude(work, lanes, lane, nominal, stirred // STIR_EPOCHS)
         if layout.load_learnt(work, lanes, lane).state == 0.0:
             stir = stir_at((stirred + STIR_EPOCHS) % STIR_EPOCHS)
     layout.store_stir(work, lanes, lane, stir)
@@ -109,10 +109,10 @@ def stir_at(turn: int) -> Stir:
 
 
 @procedure
-def conclude(work: Work, lanes: Lanes, lane: int, told: Told, periods: int) -> None:
+def conclude(work: Work, lanes: Lanes, lane: int, nominal: NominalModel, periods: int) -> None:
     """Judge the learning after a number of periods and shape the gains by it; it goes on where it is too unsure."""
     before = layout.load_learnt(work, lanes, lane)
-    learnt = judged(solved(work, lanes, layout.SPECTRA, layout.LEARNING_SCRATCH, lane, told, periods))
+    learnt = judged(solved(work, lanes, layout.SPECTRA, layout.LEARNING_SCRATCH, lane, nominal, periods))
     layout.store_loop_gains(work, lanes, lane, shaped(layout.load_loop_gains(work, lanes, lane), learnt))
     more = learnt.state == -1.0 and periods < MOST_PERIODS
     state = 0.0 if more else learnt.state

@@ -16,12 +16,12 @@ from flownav.core.frames import conjugate, quaternion_product, rotation_from_qua
 from flownav.estimation.consistency import normalised_error
 from flownav.estimation.named import Attitude, PositionNed, VelocityNed
 from flownav.navigation.memory import load_reading, load_start, store_reading
-from flownav.navigation.now import Carried, carried, coasted, state_of
+from flownav.navigation.now import NowState, coasted, moved_on, state_of
 from flownav.navigation.records import GroundMemory, Reading, StartMemory, SuspicionMemory
 from flownav.simulation import calls, records
 from flownav.simulation.block import Aboard
 from flownav.simulation.layout import FIELDS, PLANT, ROWS, load_inertial_then, load_slot, store_estimated, store_row
-from flownav.simulation.said import GroundSaid, PadSaid, PadVariance, StatedVariance, on_both
+from flownav.simulation.navigator_view import GroundEstimate, PadEstimate, PadVariance, StatedVariance, on_both
 from flownav.vehicle.state import Around, HelicopterState
 
 EPOCH_S = 0.02
@@ -132,16 +132,16 @@ def compare_at_horizon(
     running = start.started > 0.0 and reached
     own = rotation_from_quaternion(attitude.qw, attitude.qx, attitude.qy, attitude.qz)
     true = rotation_from_quaternion(then.qw, then.qx, then.qy, then.qz)
-    said = to_body(own, velocity.vel_n, velocity.vel_e, velocity.vel_d)
+    moved_ned = to_body(own, velocity.vel_n, velocity.vel_e, velocity.vel_d)
     was = to_body(true, then.vel_n_m_s, then.vel_e_m_s, then.vel_d_m_s)
     return Compared(
         records.HorizonError(
             position.pos_n - then.pos_n_m if running else np.nan,
             position.pos_e - then.pos_e_m if running else np.nan,
             position.pos_d - then.pos_d_m if running else np.nan,
-            said[0] - was[0] if running else np.nan,
-            said[1] - was[1] if running else np.nan,
-            said[2] - was[2] if running else np.nan,
+            moved_ned[0] - was[0] if running else np.nan,
+            moved_ned[1] - was[1] if running else np.nan,
+            moved_ned[2] - was[2] if running else np.nan,
         ),
         records.Spread(*stated) if start.started > 0.0 else NOTHING_STATED,
     )
@@ -184,7 +184,9 @@ def put_on_truth(
 
 # -- from the horizon to now --------------------------------------------------------------------------------------
 @on_both(calls.find_place)
-def find_place(place: records.PadPlace, pad: PadSaid, ground: GroundMemory, below: GroundSaid) -> records.PadPlace:
+def find_place(
+    place: records.PadPlace, pad: PadEstimate, ground: GroundMemory, below: GroundEstimate
+) -> records.PadPlace:
     """The pad's place by its camera and by the range, where they have found it."""
     found, grounded = pad.known > 0.0, ground.known > 0.0
     return records.PadPlace(
@@ -195,7 +197,9 @@ def find_place(place: records.PadPlace, pad: PadSaid, ground: GroundMemory, belo
 
 
 @procedure
-def carry_ahead(work: Work, nav: Work, lanes: Lanes, heard: int, ahead: int, period_s: float, table: Timetable) -> None:
+def carry_ahead(
+    work: Work, nav: Work, lanes: Lanes, inertial: int, ahead: int, period_s: float, table: Timetable
+) -> None:
     """Store the estimate of now: the navigator's state moved on by the newest `ahead` of the `heard` inertial readings.
 
     Position is counted from where the vehicle takes its pad to be: a camera's pad, else what it noted; its height over
@@ -204,15 +208,15 @@ def carry_ahead(work: Work, nav: Work, lanes: Lanes, heard: int, ahead: int, per
     find_place(work, lanes, nav)
     for lane in range(len(lanes)):
         c = state_of(nav, lanes, lane)
-        for k in range(heard - ahead, heard):
+        for k in range(inertial - ahead, inertial):
             between = load_inertial_then(work, lanes, inertial_row(k, period_s, table), lane)
-            heard_it = np.isfinite(between.rate_x_rad_s + between.force_x_m_s2)
-            c = carried(c, between, period_s) if heard_it else coasted(c, period_s)
+            has_motion = np.isfinite(between.rate_x_rad_s + between.force_x_m_s2)
+            c = moved_on(c, between, period_s) if has_motion else coasted(c, period_s)
         store_estimated(work, lanes, lane, over_pad(c, load_place(work, lanes, lane)))
 
 
 @equation
-def over_pad(c: Carried, place: records.PadPlace) -> records.Estimated:
+def over_pad(c: NowState, place: records.PadPlace) -> records.Estimated:
     """The state as the autopilot uses it: position over the pad, body velocity and attitude."""
     u, v, w = to_body(rotation_from_quaternion(c.qw, c.qx, c.qy, c.qz), c.vel_n, c.vel_e, c.vel_d)
     return records.Estimated(
@@ -222,7 +226,7 @@ def over_pad(c: Carried, place: records.PadPlace) -> records.Estimated:
 
 @on_both(calls.note_knowledge)
 def note_knowledge(
-    before: Knowledge, around: Around, pad: PadSaid, variance: PadVariance, ground: GroundMemory,
+    before: Knowledge, around: Around, pad: PadEstimate, variance: PadVariance, ground: GroundMemory,
     suspicion: SuspicionMemory,
 ) -> Knowledge:  # fmt: skip
     """Knowledge of the landing, by the vehicle's navigator and its camera, an epoch later."""
@@ -246,7 +250,7 @@ def keep_inertial(reading: Reading) -> records.InertialThen:
 
 
 # -- who flies ----------------------------------------------------------------------------------------------------
-class HandedOver(NamedTuple):
+class AtHandover(NamedTuple):
     """The autopilot's feedback, with the place from which it counts and the error of the attitude."""
 
     place: records.PadPlace
@@ -256,27 +260,27 @@ class HandedOver(NamedTuple):
 
 @on_both(calls.hand_to_autopilot)
 def hand_to_autopilot(
-    state: HelicopterState, start: StartMemory, loads: records.Loads, place: records.PadPlace, said: records.Estimated,
+    state: HelicopterState, start: StartMemory, loads: records.Loads, place: records.PadPlace, now: records.Estimated,
     *, waiting: bool, at_start: bool, reference: Reference,
-) -> HandedOver:  # fmt: skip
+) -> AtHandover:  # fmt: skip
     """Before the hand-over the vehicle stands where its path begins, or flies with the truth as feedback, and notes its
     place.
 
     waiting: the hand-over is still to come; at_start: its pad is where its path begins.
     """
     running = start.started > 0.0
-    handed = running and not waiting
-    notes, stands = at_start and running and not handed, loads.contact_n > 0.0
+    in_charge = running and not waiting
+    notes, stands = at_start and running and not in_charge, loads.contact_n > 0.0
     noted = records.PadPlace(
-        place.north_m + said.pos_n_m - (reference.pos_n if stands else state.pos_n),
-        place.east_m + said.pos_e_m - (reference.pos_e if stands else state.pos_e),
-        place.down_m + said.pos_d_m - (reference.pos_d if stands else state.pos_d),
+        place.north_m + now.pos_n_m - (reference.pos_n if stands else state.pos_n),
+        place.east_m + now.pos_e_m - (reference.pos_e if stands else state.pos_e),
+        place.down_m + now.pos_d_m - (reference.pos_d if stands else state.pos_d),
     )
     truth = records.Estimated(
         state.pos_n, state.pos_e, state.pos_d, state.u, state.v, state.w, state.qw, state.qx, state.qy, state.qz
     )
-    flown = said if handed else truth
+    flown = now if in_charge else truth
     turn = quaternion_product(
         (flown.qw, flown.qx, flown.qy, flown.qz), conjugate((state.qw, state.qx, state.qy, state.qz))
     )
-    return HandedOver(noted if notes else place, flown, records.AttitudeError(*turn))
+    return AtHandover(noted if notes else place, flown, records.AttitudeError(*turn))

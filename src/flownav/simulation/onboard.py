@@ -195,8 +195,8 @@ def camera_sheet(scenario: Wishes, sheet: FlowCameraSheet, lens_down_m: float) -
 def range_sheet(scenario: Wishes, sheet: RangeSensorSheet, lens_down_m: float) -> RangeSensorSheet:
     """The rangefinder with the scenario's changes, its lens where the scenario puts it."""
     sonar = scenario.rangefinder
-    said = {name: getattr(sonar, name) for name in sonar.model_fields_set}
-    return on_clock(sheet.model_copy(update=said | {"lens": at_height(sheet.lens, lens_down_m)}))
+    given = {name: getattr(sonar, name) for name in sonar.model_fields_set}
+    return on_clock(sheet.model_copy(update=given | {"lens": at_height(sheet.lens, lens_down_m)}))
 
 
 def pad_sheet(scenario: Wishes, sheet: PadCameraSheet, lens_down_m: float) -> PadCameraSheet | None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import Path
-from flownav.control.learnt_model import Told
+from flownav.control.learnt_model import NominalModel
 from flownav.estimation.paper_filter import PaperModel
 from flownav.sensors.geometry import Ground
 from flownav.simulation.ground import RecirculationParameters
@@ -92,5 +92,7 @@ class Flight(NamedTuple):
     linear: LinearTruth | None
     limits: TouchdownLimits
     fails: bool | None = None  # its sensors may fail, each lane's as its truth has it; None: the code is not compiled
-    learns: Told | None = None  # what is believed of a vehicle that may be learnt in hover; None: it is not compiled
+    learns: NominalModel | None = (
+        None  # what is believed of a vehicle that may be learnt in hover; None: it is not compiled
+    )
     own: OwnParts | None = None  # a user's own vehicle and controller (room parts/)

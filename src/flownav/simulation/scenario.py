@@ -15,10 +15,10 @@ from flownav.core.guard import an_input
 from flownav.core.parameter_files import Number, ParameterModel, load, shipped
 from flownav.core.text import meant
 from flownav.sensors.settings import FlowSettings, GpsInsSettings, PadFixSettings, RangefinderSettings
-from flownav.simulation.carried import carried_sensors
 from flownav.simulation.dispersion import SHIPPED as SHIPPED_DISPERSION
 from flownav.simulation.dispersion import DispersionSection
 from flownav.simulation.ground import GroundSettings, RecirculationSettings
+from flownav.simulation.sensor_table import sensor_rows
 from flownav.simulation.wind import WindSettings
 from flownav.vehicle.kinds import SHIPPED_NAMES
 
@@ -140,7 +140,7 @@ class EventSection(ParameterModel):
     kind: Literal["engine cut", "motor out", "tail rotor stuck", "cyclic servos slow"]  # what befalls it: see above
 
 
-_by_channel = sorted(carried_sensors(), key=lambda sensor: sensor.channels.reading)
+_by_channel = sorted(sensor_rows(), key=lambda sensor: sensor.channels.reading)
 _files: dict[str, Any] = {
     sensor.name: (str | None, Field(None, description="its datasheet, a TOML file; the shipped one unless named"))
     for sensor in _by_channel

@@ -213,7 +213,7 @@ def read_flow_sensor(
     return Flowed(flow, read_flow(flow, height, sonar.rate_m_s, n.u, n.v, n.w, sensor))
 
 
-class Heard(NamedTuple):
+class ChosenMeasurement(NamedTuple):
     """The measurement of the paper's filter, and what of it came."""
 
     measured: Measured
@@ -221,13 +221,13 @@ class Heard(NamedTuple):
 
 
 @layout.PLANT.on_lanes(calls.choose_measurement)
-def choose_measurement(gps: gps_ins.NavSolution, flow: FlowReading, *, gps_offers_velocity: bool) -> Heard:
+def choose_measurement(gps: gps_ins.NavSolution, flow: FlowReading, *, gps_offers_velocity: bool) -> ChosenMeasurement:
     """The GPS/INS's position, and velocity by flow where it is engaged, else the GPS/INS's own, turned to the body."""
     rotation = rotation_from_quaternion(gps.qw, gps.qx, gps.qy, gps.qz)
     ins = to_body(rotation, gps.vel_n_m_s, gps.vel_e_m_s, gps.vel_d_m_s)
     engaged = flow.engaged > 0.0
     came = 1.0 if engaged or gps_offers_velocity else 0.0
-    return Heard(
+    return ChosenMeasurement(
         Measured(
             gps.pos_n_m,
             gps.pos_e_m,

@@ -12,12 +12,12 @@ from flownav.core.measurement import Array
 from flownav.sensors.gps_ins import GpsInsNormals
 from flownav.simulation import layout
 from flownav.simulation.block import RECIRCULATION_CHANNEL
-from flownav.simulation.carried import CarriedSensor
 from flownav.simulation.ground import RecirculationState
 from flownav.simulation.noise import CHANNELS_PER_STEP, threefry
 from flownav.simulation.onboard import ALWAYS, EPOCH_S, PHYSICS_PERIOD_S, Clock, Onboard
 from flownav.simulation.plan import Flight
 from flownav.simulation.sensing import RANGE_EPOCHS
+from flownav.simulation.sensor_table import SensorRow
 from flownav.simulation.wind import WindNormals
 
 SPARE = "spare"  # a field that makes a count even, and is drawn for nothing
@@ -69,7 +69,7 @@ def _units(s: Onboard) -> list[tuple[str, Any, int]]:
     ]
 
 
-def fitted_to(s: Onboard) -> list[CarriedSensor]:
+def fitted_to(s: Onboard) -> list[SensorRow]:
     """The sensors that the vehicle carries, in the order of their channels."""
     return [sensor for sensor in layout.BY_CHANNEL if getattr(s.carried, sensor.name).clock.fitted]
 

@@ -14,8 +14,8 @@ import numpy as np
 from flownav.core.measurement import Array
 from flownav.sensors.flow import FlowParameters
 from flownav.sensors.geometry import Ground
-from flownav.simulation.carried import carried_sensors
 from flownav.simulation.ground import RecirculationParameters
+from flownav.simulation.sensor_table import sensor_rows
 from flownav.simulation.wind import WindParameters
 from flownav.vehicle.kinds import AnyVehicle
 from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters
@@ -67,8 +67,8 @@ class SensorFault(NamedTuple):
 SOUND = SensorFault()
 
 
-CARRIED = carried_sensors()
-NAMES, LATE = [one.name for one in CARRIED], [one.name for one in CARRIED if one.late]
+SENSOR_TABLE = sensor_rows()
+NAMES, LATE = [one.name for one in SENSOR_TABLE], [one.name for one in SENSOR_TABLE if one.late]
 
 # one of something for each carried sensor, and how much older than stated readings may be on arrival [s]
 Carried: Any = namedtuple("Carried", NAMES)  # type: ignore[misc]
@@ -94,7 +94,7 @@ class Truth(NamedTuple):
 
 
 PARTS: dict[str, Any] = get_type_hints(Truth) | {"vehicle": VehicleParameters, "late": Lateness}
-PARTS = {part: kind for part, kind in PARTS.items() if part != "carried"} | {o.name: o.parameters for o in CARRIED}
+PARTS = {part: kind for part, kind in PARTS.items() if part != "carried"} | {o.name: o.parameters for o in SENSOR_TABLE}
 LARGEST_VEHICLE = max(len(VehicleParameters._fields), len(MultirotorParameters._fields))
 SIZES = {part: len(kind._fields) for part, kind in PARTS.items()} | {"vehicle": LARGEST_VEHICLE}
 TRUTH_ROWS = sum(SIZES.values())

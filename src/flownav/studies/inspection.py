@@ -37,7 +37,7 @@ def summarise(log: Log) -> dict[str, Any]:
     start, end = log.span_s
     look, why_not = _look(log)
     checked, found = _findings(log)
-    found += told_of(log, look, found)
+    found += findings_of(log, look, found)
     found += [Finding(text) for text in silences(log.streams, log.span_s)]
     explained = explain(log)
     return {
@@ -157,8 +157,8 @@ def _findings(log: Log) -> tuple[str, list[Finding]]:
     witness = _witness(log)
     if witness is None:
         return compared, found
-    said = findings({**streams, Sensor.GPS_VELOCITY: witness}, ())
-    found += [finding._replace(text=finding.text.replace("GPS", "the reference")) for finding in said]
+    of_reference = findings({**streams, Sensor.GPS_VELOCITY: witness}, ())
+    found += [finding._replace(text=finding.text.replace("GPS", "the reference")) for finding in of_reference]
     return f"{compared}; flow with the reference's velocity", found
 
 
@@ -182,13 +182,13 @@ def _autopilot(log: Log) -> dict[str, Any] | None:
 LEAST_JUMPING = 0.01  # of the steps in flight: of less, one echo is no trouble
 
 
-def told_of(log: Log, look: Look | None, found: Sequence[Finding]) -> list[Finding]:
+def findings_of(log: Log, look: Look | None, found: Sequence[Finding]) -> list[Finding]:
     """Warnings next to those found: the flow's axes, unless they are reported already, and a range that jumps."""
-    told = []
+    remarks = []
     if look is not None and look.clear and not look.right and not any(finding.flow_is_wrong for finding in found):
         sure = look.correlation >= IN_PART
-        told += [Finding(f"flow: {look.axes}, against {look.against}; mend the log's flow columns", True)] * sure
-    return [*told, *_of_range(log)]
+        remarks += [Finding(f"flow: {look.axes}, against {look.against}; mend the log's flow columns", True)] * sure
+    return [*remarks, *_of_range(log)]
 
 
 def _of_range(log: Log) -> list[Finding]:
@@ -198,9 +198,9 @@ def _of_range(log: Log) -> list[Finding]:
     aloft = flying_at(log, stream.t_s - stream.delay_s) & (stream.value[:, 0] > 0.0)
     t_s, range_m = stream.t_s[aloft], stream.value[aloft, 0]
     share, doubt = jumps(t_s, range_m)
-    told = [Finding(line) for line in untrue(log, aloft).said]
+    remarks = [Finding(line) for line in untrue(log, aloft).notes]
     if share < LEAST_JUMPING:
-        return told
+        return remarks
     largest = float(np.abs(np.diff(range_m)).max())
     jumping = f"range jumps in {share:.0%} of its steps in flight, by up to {largest:.1f} m"
-    return [*told, Finding(f"{jumping}: velocities from flow and range are off by {doubt:.0%} or so")]
+    return [*remarks, Finding(f"{jumping}: velocities from flow and range are off by {doubt:.0%} or so")]

@@ -81,10 +81,11 @@ def corners(path: Path | None = None) -> Iterator[Corner]:
     """
     path = vehicle_file(path)
     contents = read_toml(path)
-    told = read_kind(contents, str(path))
-    yield Corner(NOMINAL, flattened(told))
+    nominal_file = read_kind(contents, str(path))
+    yield Corner(NOMINAL, flattened(nominal_file))
     crossed, alone = (
-        {name: keys for name, keys in groups.items() if _is_wide(contents, keys, path)} for groups in groups_of(told)
+        {name: keys for name, keys in groups.items() if _is_wide(contents, keys, path)}
+        for groups in groups_of(nominal_file)
     )
     combined = list(product((-1, 1), repeat=len(crossed))) if crossed else []
     for groups, signs in [(crossed, signs) for signs in combined] + [
@@ -111,14 +112,14 @@ def _ends(entry: Any, key: str, path: Path) -> tuple[float, float] | None:
     """The smallest and the largest value that an entry states; None where it states no uncertainty."""
     if not isinstance(entry, dict) or "uncertainty" not in entry:
         return None
-    said = entry["uncertainty"]
+    stated = entry["uncertainty"]
     try:
-        if isinstance(said, str):
-            low, _, high = said.partition("..")
+        if isinstance(stated, str):
+            low, _, high = stated.partition("..")
             return float(low), float(high)
-        return float(entry["value"] - said), float(entry["value"] + said)
+        return float(entry["value"] - stated), float(entry["value"] + stated)
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f'{path}: {key}: uncertainty is a number or "from..to", got {as_shown(said)}') from None
+        raise InputError(f'{path}: {key}: uncertainty is a number or "from..to", got {as_shown(stated)}') from None
 
 
 def _moved(contents: dict[str, Any], key: str, sign: int, path: Path) -> dict[str, Any]:

@@ -36,8 +36,8 @@ class Servo(NamedTuple):
 
 def servo_of(control: str) -> Callable[[VehicleParameters], Servo]:
     """An equation: the servo of a control, of the parameters that begin with its name."""
-    told = ", ".join(f"vehicle.{control}_{name}" for name in Servo._fields)
-    return equation(write_function("servo", f"def servo(vehicle):\n    return Servo({told})\n", {"Servo": Servo}))
+    arguments = ", ".join(f"vehicle.{control}_{name}" for name in Servo._fields)
+    return equation(write_function("servo", f"def servo(vehicle):\n    return Servo({arguments})\n", {"Servo": Servo}))
 
 
 cyclic_servo, collective_servo, pedal_servo = servo_of("cyclic"), servo_of("collective"), servo_of("pedal")

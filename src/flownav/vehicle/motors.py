@@ -107,16 +107,16 @@ def roots_of_shares(x: Six, hexa: bool) -> Six:
 
 
 @equation
-def told_speed(root: float, voltage_v: float, vehicle: MultirotorParameters) -> float:
+def commanded_speed(root: float, voltage_v: float, vehicle: MultirotorParameters) -> float:
     """The speed for the root of a share [rad/s]; it falls with the battery's voltage."""
     full: float = vehicle.full_speed_rad_s * voltage_v * (1.0 / vehicle.full_v)
     return full * root
 
 
 @equation
-def speed_rate(speed: float, told: float, vehicle: MultirotorParameters) -> float:
+def speed_rate(speed: float, commanded: float, vehicle: MultirotorParameters) -> float:
     """First-order lag of a motor [rad/s2]."""
-    return vehicle.motor_rate_1_s * (told - speed)
+    return vehicle.motor_rate_1_s * (commanded - speed)
 
 
 @equation

@@ -175,12 +175,14 @@ def derivative_at_roots(
     voltage = motors.battery_voltage(power, state.used, vehicle)
     drive = driven(voltage * around.engine, around.motor_out)
     spins = Six(
-        motors.speed_rate(speeds.one, motors.told_speed(roots.one, drive.one, vehicle), vehicle),
-        motors.speed_rate(speeds.two, motors.told_speed(roots.two, drive.two, vehicle), vehicle),
-        motors.speed_rate(speeds.three, motors.told_speed(roots.three, drive.three, vehicle), vehicle),
-        motors.speed_rate(speeds.four, motors.told_speed(roots.four, drive.four, vehicle), vehicle),
-        motors.speed_rate(speeds.five, motors.told_speed(roots.five, drive.five, vehicle), vehicle) if hexa else 0.0,
-        motors.speed_rate(speeds.six, motors.told_speed(roots.six, drive.six, vehicle), vehicle) if hexa else 0.0,
+        motors.speed_rate(speeds.one, motors.commanded_speed(roots.one, drive.one, vehicle), vehicle),
+        motors.speed_rate(speeds.two, motors.commanded_speed(roots.two, drive.two, vehicle), vehicle),
+        motors.speed_rate(speeds.three, motors.commanded_speed(roots.three, drive.three, vehicle), vehicle),
+        motors.speed_rate(speeds.four, motors.commanded_speed(roots.four, drive.four, vehicle), vehicle),
+        motors.speed_rate(speeds.five, motors.commanded_speed(roots.five, drive.five, vehicle), vehicle)
+        if hexa
+        else 0.0,
+        motors.speed_rate(speeds.six, motors.commanded_speed(roots.six, drive.six, vehicle), vehicle) if hexa else 0.0,
     )
     normal = plane_normal(rotation, around)
     below = below_plane(state.pos_n, state.pos_e, state.pos_d, around)

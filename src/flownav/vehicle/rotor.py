@@ -44,9 +44,9 @@ def speed_ratio(speed_rad_s: float, vehicle: VehicleParameters) -> float:
 def rotor_of(name: str) -> Callable[[VehicleParameters, float], Rotor]:
     """An equation: a rotor of a vehicle at a ratio of the main rotor's governed speed, of the parameters so called."""
     speeds, squares = Rotor._fields[:4], Rotor._fields[4:]
-    told = [f"vehicle.{name}_{field} * ratio" for field in speeds]
-    told += [f"vehicle.{name}_{field} * (ratio * ratio)" for field in squares]
-    text = f"def rotor(vehicle, ratio):\n    return Rotor({', '.join(told)})\n"
+    scaled = [f"vehicle.{name}_{field} * ratio" for field in speeds]
+    scaled += [f"vehicle.{name}_{field} * (ratio * ratio)" for field in squares]
+    text = f"def rotor(vehicle, ratio):\n    return Rotor({', '.join(scaled)})\n"
     return equation(write_function("rotor", text, {"Rotor": Rotor}))
 
 
@@ -79,11 +79,11 @@ def refine_induced_velocity(induced: float, thrustless: float, inplane_sq: float
     Squared, equation 2.2 is a polynomial: the step takes one division and no root.
     """
     c_sq = rotor.inflow_speed_m_s * rotor.inflow_speed_m_s
-    through, carried = induced - axial, thrustless - induced
+    through, thrust_part = induced - axial, thrustless - induced
     induced_sq = induced * induced
     resultant_sq = inplane_sq + through * through
-    balance = induced_sq * resultant_sq - c_sq * (carried * carried)
-    half_slope = induced * resultant_sq + induced_sq * through + c_sq * carried
+    balance = induced_sq * resultant_sq - c_sq * (thrust_part * thrust_part)
+    half_slope = induced * resultant_sq + induced_sq * through + c_sq * thrust_part
     quarter_curvature = 0.5 * (resultant_sq + induced_sq - c_sq) + 2.0 * induced * through
     slope_sq = half_slope * half_slope
     # f'²/2 - f·f''/4; the floor binds far outside the model's validity only, and keeps every step finite

@@ -66,8 +66,8 @@ def plan_of(requirement: Requirement, flights: int | None = None, vehicle: str |
 
 def seed_of(seed: int, each: int, asked: tuple[str, ...]) -> int:
     """A campaign's seed, 31 bits of the SHA-256 of the requirement's seed, the flights a cell and what is asked."""
-    told = "\n".join([str(seed), str(each), *asked])
-    return int.from_bytes(sha256(told.encode()).digest()[:4], "big") >> 1
+    seeds = "\n".join([str(seed), str(each), *asked])
+    return int.from_bytes(sha256(seeds.encode()).digest()[:4], "big") >> 1
 
 
 def require_planned(plan: Plan, folder: Path) -> None:
@@ -179,8 +179,8 @@ def _failure(requirement: Requirement, scenario: Scenario, name: str) -> SensorF
         raise InputError(f'{where}: the paper\'s filter has no sensors that fail; fly filter.name = "landing"')
     fault, conditions, flight = FAULTS[name], requirement.conditions, scenario.flight
     lands_s = float(flight.duration_s if flight.may_land_after_s is None else flight.may_land_after_s)
-    handed_s = float(flight.takeoff_at_s if flight.start == "ground" else scenario.filter.handover_s)
-    begins_s = lands_s if fault.in_descent else max(lands_s - BEFORE_LANDING_S, handed_s)
+    begun_s = float(flight.takeoff_at_s if flight.start == "ground" else scenario.filter.handover_s)
+    begins_s = lands_s if fault.in_descent else max(lands_s - BEFORE_LANDING_S, begun_s)
     if conditions.fault_begins_s is not None:
         begins_s = float(conditions.fault_begins_s)
     if begins_s >= flight.duration_s:

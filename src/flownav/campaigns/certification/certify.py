@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flownav.campaigns.certification.again import SAMPLE, Again, deciding, drawn, fly_again
 from flownav.campaigns.certification.cells import words_of
-from flownav.campaigns.certification.envelope import Judgement, bad_first, envelope_of, failing, judged, outcome
+from flownav.campaigns.certification.envelope import Judgement, bad_first, envelope_of, failures_in, judged, outcome
 from flownav.campaigns.chain import DIGEST_BYTES, DamagedError, read_part, write_part
 from flownav.campaigns.engines import Engine, Part
 from flownav.campaigns.measures import ROW_COLUMNS, measured
@@ -28,7 +28,7 @@ from flownav.core.text import finite
 from flownav.simulation.dispersion import Design
 
 NONE_AGAIN = Again(0, 0)
-FLIGHTS_TOLD = 10  # flights that are named as the worst
+FLIGHTS_NAMED = 10  # flights that are named as the worst
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class Certificate:
             "tolerance_bound": primary.as_json()["tolerance_bound"],
             "verdicts": {name: self.flown.verdicts.count(name) for name in sorted(set(self.flown.verdicts))},
             "envelope": self.envelope,
-            "worst": [self.told(flight) for flight in self.worst],
+            "worst": [self.facts_of(flight) for flight in self.worst],
         }
         return facts | ({"ranking": None, "split": None} if self.ranking is None else self.ranking)
 
@@ -116,7 +116,7 @@ class Certificate:
         own, flown = self.requirement, self.plan.cells[0].scenario.vehicle.file
         return None if own.conditions.vehicle or flown == scenario_of(own).vehicle.file else flown
 
-    def told(self, flight: int) -> dict[str, Any]:
+    def facts_of(self, flight: int) -> dict[str, Any]:
         """One flight in the list of the worst."""
         cell, rows = int(self.flown.cell[flight]), self.flown.rows[flight : flight + 1]
         figures = {table.measure: measured(table.measure, rows)[0] for table in self.requirement.requirement}
@@ -126,7 +126,7 @@ class Certificate:
             "cell_number": cell,
             "verdict": self.flown.verdicts[flight],
             "limited_by": self.flown.limits[flight],
-            "failed": bool(failing(self.requirement, rows).any()),
+            "failed": bool(failures_in(self.requirement, rows).any()),
             "figures": finite(figures),
             "inputs": {name: float(self.flown.inputs[name][flight]) for name in self.envelope["axes"]},
         }
@@ -212,8 +212,8 @@ def worst_of(requirement: Requirement, rows: Array) -> tuple[int, ...]:
     table = requirement.requirement[0]
     figures = bad_first(table, measured(table.measure, rows))
     badness = figures if table.upper else -figures
-    order = np.lexsort((np.arange(len(rows)), -badness, -failing(requirement, rows).sum(axis=0)))
-    return tuple(int(flight) for flight in order[:FLIGHTS_TOLD])
+    order = np.lexsort((np.arange(len(rows)), -badness, -failures_in(requirement, rows).sum(axis=0)))
+    return tuple(int(flight) for flight in order[:FLIGHTS_NAMED])
 
 
 # -- the ranking -------------------------------------------------------------------------------------------------

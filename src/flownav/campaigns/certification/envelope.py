@@ -80,14 +80,16 @@ class Judgement(NamedTuple):
         if self.verdict == "fail":
             return "No number of flights shows it: its opposite is shown."
         enough = needed_by(table, self.failures)
-        said = (
+        statement = (
             f"{self.failures} failures in {self.flights} flights show neither. A plan that allows {self.failures} "
             f"failures needs {enough} flights"
         )
         serves = flights_to_show(rate, table.probability, table.confidence)
         if serves is None:
-            return f"{said}; at the share of failures found, {100.0 * rate:.3g} %, no plan is likely to pass."
-        return f"{said}; at the share of failures found, {100.0 * rate:.3g} %, one of {serves} passes 9 times in 10."
+            return f"{statement}; at the share of failures found, {100.0 * rate:.3g} %, no plan is likely to pass."
+        return (
+            f"{statement}; at the share of failures found, {100.0 * rate:.3g} %, one of {serves} passes 9 times in 10."
+        )
 
 
 def judged(table: RequirementTable, rows: Array) -> Judgement:
@@ -160,7 +162,7 @@ def outcome(requirement: Requirement, rows: Array) -> dict[str, Any]:
     """How a part of the flights did: of all requirements together, rows (flights, len(ROW_COLUMNS))."""
     if not len(rows):
         return {"flights": 0, "failures": 0, "share": None, "low": 0.0, "high": 1.0, "verdict": "not shown"}
-    failures = int(failing(requirement, rows).any(axis=0).sum())
+    failures = int(failures_in(requirement, rows).any(axis=0).sum())
     confidence = max(table.confidence for table in requirement.requirement)
     low, high = interval(len(rows), failures, confidence)
     return {
@@ -173,7 +175,7 @@ def outcome(requirement: Requirement, rows: Array) -> dict[str, Any]:
     }
 
 
-def failing(requirement: Requirement, rows: Array) -> NDArray[np.bool_]:
+def failures_in(requirement: Requirement, rows: Array) -> NDArray[np.bool_]:
     """Which flights fail which requirement, (requirements, flights)."""
     return np.array([failed(table, measured(table.measure, rows)) for table in requirement.requirement])
 

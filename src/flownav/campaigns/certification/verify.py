@@ -88,10 +88,10 @@ class Verification:
 
     def as_json(self) -> dict[str, Any]:
         """The checks as `flownav certify --verify --json` prints them."""
-        said = self.facts.get("requirement")
+        stored = self.facts.get("requirement")
         return {
             "folder": str(self.folder),
-            "requirement": said.get("name") if isinstance(said, dict) else None,
+            "requirement": stored.get("name") if isinstance(stored, dict) else None,
             "verdict": self.facts.get("verdict"),
             "flights": self.facts.get("flights"),
             "verification": self.verification,
@@ -120,14 +120,14 @@ def _look(
 ) -> None:  # fmt: skip
     _signature(made, None if key is None else public_key(key))
     _files(made)
-    plan_said = plan_in(made.folder)
-    _rows(made, plan_said)
+    stored_plan = plan_in(made.folder)
+    _rows(made, stored_plan)
     asked = _requirement(made, requirement)
     ours = _is_of_this_code(made)
     if asked is not None:
         chosen = made.facts["chosen"]
         plan = plan_of(asked, chosen["flights"], chosen["vehicle"])
-        certificate = _figures(made, asked, plan) if _plan(made, plan, plan_said, ours=ours) else None
+        certificate = _figures(made, asked, plan) if _plan(made, plan, stored_plan, ours=ours) else None
         if certificate is not None and ours:
             _flights(made, certificate, engine, sample, on_progress)
             _ranking(made, certificate)
@@ -168,17 +168,17 @@ def _signature(made: Verification, key: Any) -> None:
 
 def _files(made: Verification) -> None:
     """The hashes of what lies in the folder."""
-    said = made.facts["files"]["out"] | made.facts["files"].get("page", {})
-    needed = {"campaign.json", PAGE} - set(said)
+    hashes = made.facts["files"]["out"] | made.facts["files"].get("page", {})
+    needed = {"campaign.json", PAGE} - set(hashes)
     if needed:
         made.note("files", f"{', '.join(sorted(needed))}: has no hash", "")
-    made.note("files", hashes_again(said, made.folder), f"{len(said)} files have their hashes")
+    made.note("files", hashes_again(hashes, made.folder), f"{len(hashes)} files have their hashes")
 
 
 def _rows(made: Verification, plan: dict[str, Any]) -> None:
     """The digests of all flights, from the plan on, and that their files are those that have hashes."""
     rows, wrong = 0, None
-    data, said = Dataset(made.folder), set(made.facts["files"]["out"])
+    data, hashes = Dataset(made.folder), set(made.facts["files"]["out"])
     for cell in range(len(plan["cells"])):
         link = root_of(plan, cell)
         for path in data.parts(cell):
@@ -191,7 +191,7 @@ def _rows(made: Verification, plan: dict[str, Any]) -> None:
                 wrong = wrong or f"{name}: {error}"
                 break
             rows, link = rows + len(part.table), part.last
-            wrong = wrong or (None if name in said else f"{name}: has no hash")
+            wrong = wrong or (None if name in hashes else f"{name}: has no hash")
     made.note("digests", wrong, f"{rows} flights follow each other from the plan on")
 
 
@@ -204,12 +204,12 @@ def _requirement(made: Verification, named: str | None) -> Requirement | None:
     if named is None and not path.is_file():
         return None
     asked = load_requirement(str(path))
-    told = [one["sentence"] for one in made.facts["requirement"]["requirements"]]
+    stated = [one["sentence"] for one in made.facts["requirement"]["requirements"]]
     ours = [table.sentence() for table in asked.requirement]
-    differs = next((f"it asks for {own}, the certificate for {other}" for own, other in zip(ours, told, strict=False)
+    differs = next((f"it asks for {own}, the certificate for {other}" for own, other in zip(ours, stated, strict=False)
                     if own != other), None)  # fmt: skip
-    if differs is None and len(ours) != len(told):
-        differs = f"it asks for {len(ours)} things, the certificate for {len(told)}"
+    if differs is None and len(ours) != len(stated):
+        differs = f"it asks for {len(ours)} things, the certificate for {len(stated)}"
     if differs is None and hash_of(path) != files[first]:
         differs = "it is another than when the flights were flown"
     made.note("requirement", differs and f"{path}: {differs}", f"{path} asks for what was judged")
@@ -235,10 +235,10 @@ def _is_of_this_code(made: Verification) -> bool:
 OF_THE_CODE = ("flownav", "code_sha256")  # keys of a plan
 
 
-def _plan(made: Verification, plan: Plan, said: dict[str, Any], *, ours: bool) -> bool:
+def _plan(made: Verification, plan: Plan, stored: dict[str, Any], *, ours: bool) -> bool:
     own = json.loads(json.dumps(plan.as_json))
-    keys = [key for key in own | said if ours or key not in OF_THE_CODE]
-    differs = ", ".join(key for key in keys if own.get(key) != said.get(key))
+    keys = [key for key in own | stored if ours or key not in OF_THE_CODE]
+    differs = ", ".join(key for key in keys if own.get(key) != stored.get(key))
     wrong = f"campaign.json has another {differs} than the requirement makes" if differs else None
     return made.note("plan", wrong, f"seed {plan.seed}, {plan.flights} flights a cell, as the requirement makes them")
 
@@ -262,15 +262,15 @@ def _figures(made: Verification, asked: Requirement, plan: Plan) -> Certificate 
     return certificate if good else None
 
 
-def _differs(key: str, said: Any, own: Any) -> str:
+def _differs(key: str, stored: Any, own: Any) -> str:
     """The first difference, by its dotted name, as deep as both are tables."""
-    if isinstance(said, dict) and isinstance(own, dict):
-        inner = next((name for name in own | said if own.get(name) != said.get(name)), "")
-        return _differs(f"{key}.{inner}", said.get(inner), own.get(inner))
-    if isinstance(said, list) and isinstance(own, list) and len(said) == len(own):
-        place = next((k for k, pair in enumerate(zip(said, own, strict=True)) if pair[0] != pair[1]), 0)
-        return _differs(f"{key}[{place}]", said[place], own[place])
-    return f"{key} is {_short(said)} in the certificate and {_short(own)} by the rows"
+    if isinstance(stored, dict) and isinstance(own, dict):
+        inner = next((name for name in own | stored if own.get(name) != stored.get(name)), "")
+        return _differs(f"{key}.{inner}", stored.get(inner), own.get(inner))
+    if isinstance(stored, list) and isinstance(own, list) and len(stored) == len(own):
+        place = next((k for k, pair in enumerate(zip(stored, own, strict=True)) if pair[0] != pair[1]), 0)
+        return _differs(f"{key}[{place}]", stored[place], own[place])
+    return f"{key} is {_short(stored)} in the certificate and {_short(own)} by the rows"
 
 
 def _short(value: Any) -> str:
@@ -287,10 +287,10 @@ def _flights(
     except InputError as error:
         wrong = str(error)
     again = certificate.again
-    said = (
+    statement = (
         f"{again.sample} of {len(certificate.flown.rows)} drawn at random and {again.margin} at the margin are the same"
     )
-    made.note("flights flown again", wrong, said)
+    made.note("flights flown again", wrong, statement)
 
 
 class _NotFlown:

@@ -10,7 +10,7 @@ import numpy as np
 from flownav.campaigns.certification.cells import words_of as words_of_cell
 from flownav.campaigns.certification.certify import FOLDER as RANKING
 from flownav.campaigns.certification.certify import Certificate
-from flownav.campaigns.certification.envelope import failing
+from flownav.campaigns.certification.envelope import failures_in
 from flownav.campaigns.local import known_exactly
 from flownav.campaigns.measures import MEASURES, NOT_LANDED, ROW_COLUMNS, measured
 from flownav.campaigns.plan import Cell, Plan
@@ -22,11 +22,11 @@ from flownav.core.provenance import code_sha256, command_line, hash_of, provenan
 from flownav.report.campaign import render_certificate
 from flownav.report.html import write_report
 from flownav.sensors.datasheet import DEFAULT_SENSOR
-from flownav.simulation.carried import carried_sensors
 from flownav.simulation.dispersion import SHIPPED as SHIPPED_DISPERSION
 from flownav.simulation.dispersion import SHIPPED_FILE, Distribution
 from flownav.simulation.scenario import SHIPPED as SHIPPED_SCENARIOS
 from flownav.simulation.scenario import Scenario
+from flownav.simulation.sensor_table import sensor_rows
 from flownav.vehicle.kinds import vehicle_file
 from flownav.vehicle.parameters import MultirotorParameters
 
@@ -44,8 +44,8 @@ def write_certificate(
     name: the requirement's, as it was given. OSError where a file cannot be written.
     """
     facts = certificate.as_json()
-    for flight, told in zip(certificate.worst[:records], facts["worst"], strict=False):
-        told["record"], told["report"] = _recorded(certificate, flight, store.folder, name)
+    for flight, row in zip(certificate.worst[:records], facts["worst"], strict=False):
+        row["record"], row["report"] = _recorded(certificate, flight, store.folder, name)
         on_recorded(1)
     facts |= {"assumed": assumed(certificate.plan), "made_by": _made_by(), "files": _files(certificate, store, name)}
     page = render_certificate(facts, drawn(certificate))
@@ -67,7 +67,7 @@ def drawn(certificate: Certificate) -> dict[str, Any]:
     )
     return {
         "figures": {table.measure: measured(table.measure, rows) for table in requirement.requirement},
-        "failed": failing(requirement, rows).any(axis=0),
+        "failed": failures_in(requirement, rows).any(axis=0),
         "of": of,
         "north_m": north_m,
         "east_m": east_m,
@@ -180,16 +180,16 @@ def words_of(entry: Distribution) -> str:
     """A distribution as its file has it: name, parameters, what is done with the draw."""
     numbers = entry.shapes | {"loc": entry.loc, "scale": entry.scale}
     plain = {"loc": 0.0, "scale": 1.0}
-    said = ", ".join(f"{name} {value:.15g}" for name, value in numbers.items() if plain.get(name) != value)
+    numbers_words = ", ".join(f"{name} {value:.15g}" for name, value in numbers.items() if plain.get(name) != value)
     if entry.mode == "uncertainty" and entry.distribution == "truncnorm":
         low, high = (entry.shapes[name] * entry.scale for name in ("a", "b"))
         if (low, high) == (-1.0, 1.0) and entry.loc == 0.0:
             return f"normal, cut off at the stated uncertainty, {entry.shapes['b']:g} sigma"
     if entry.distribution == "uniform":
-        said = f"{entry.loc:.15g} to {entry.loc + entry.scale:.15g}"
+        numbers_words = f"{entry.loc:.15g} to {entry.loc + entry.scale:.15g}"
     of = {"value": "", "factor": " times what is believed", "offset": " more than is believed",
           "uncertainty": " of the stated uncertainty"}  # fmt: skip
-    return f"{entry.distribution} {said}{of[entry.mode]}"
+    return f"{entry.distribution} {numbers_words}{of[entry.mode]}"
 
 
 def _uncertainty(cell: Cell, name: str) -> str:
@@ -217,7 +217,7 @@ def _files_of(scenario: Scenario) -> Iterable[Path]:
     dispersion = scenario.dispersion.file
     yield shipped(SHIPPED_FILE) if dispersion == SHIPPED_DISPERSION else Path(dispersion)
     if scenario.filter.name == "landing":
-        for sensor in sorted(carried_sensors(), key=lambda one: one.channels.reading):
+        for sensor in sorted(sensor_rows(), key=lambda one: one.channels.reading):
             own = getattr(scenario.sensors, sensor.name)
             if sensor.name == "pad_camera" and scenario.pad_fix is None:
                 continue
@@ -225,11 +225,11 @@ def _files_of(scenario: Scenario) -> Iterable[Path]:
                 yield Path(own) if own else shipped(f"sensors/{sensor.sheet.shipped_file}")
 
 
-def hashes_again(said: Mapping[str, str], folder: Path | None) -> str | None:
+def hashes_again(expected: Mapping[str, str], folder: Path | None) -> str | None:
     """The first file whose SHA-256 differs or that is missing, and why; None where all agree. folder: in which they
     lie.
     """
-    for name, digest in said.items():
+    for name, digest in expected.items():
         path = Path(name) if folder is None else folder / name
         if folder is not None and (Path(name).is_absolute() or ".." in Path(name).parts):
             return f"{name}: lies elsewhere"

@@ -64,9 +64,9 @@ class FlightScores(NamedTuple):
     """
 
     noticed_s: float | None
-    said_s: float | None
+    warned_s: float | None
     largest_m: float
-    unsaid_m: float
+    unwarned_m: float
     verdict: str
     off_pad_m: float | None
 
@@ -89,8 +89,8 @@ class Row(NamedTuple):
             "duration_s": self.duration_s,
             "flights": len(self.flights),
             "noticed": _when([flight.noticed_s for flight in self.flights]),
-            "said": _when([flight.said_s for flight in self.flights]),
-            "largest_error_unsaid_m": max(flight.unsaid_m for flight in self.flights),
+            "said": _when([flight.warned_s for flight in self.flights]),
+            "largest_error_unsaid_m": max(flight.unwarned_m for flight in self.flights),
             "largest_error_m": max(flight.largest_m for flight in self.flights),
             **{verdict.replace(" ", "_"): became[verdict] for verdict in VERDICTS},
             "off_pad_m": {"median": float(np.median(off)), "worst": max(off)} if off else None,
@@ -179,15 +179,15 @@ def scores_of(
     t_s = np.arange(len(flown.history)) * EPOCH_S
     error_m = flown_error(flown.history, lane)
     down_s = touched_s(flown.history, landing, lane, t0_s)  # a later warning is no help
-    said = first_warning(flown.tape.events(lane), t0_s, down_s, horizon_s)
+    warned_s = first_warning(flown.tape.events(lane), t0_s, down_s, horizon_s)
     from_fault = (t_s >= t0_s) & np.isfinite(error_m)
-    unsaid = from_fault & (t_s < (np.inf if said is None else said))
+    unwarned = from_fault & (t_s < (np.inf if warned_s is None else warned_s))
     off = float(landing[REST_DISTANCE])
     return FlightScores(
-        _since(first_refusals(flown.tape.offers(lane), sensors, (t0_s, down_s), horizon_s, said), t0_s),
-        _since(said, t0_s),
+        _since(first_refusals(flown.tape.offers(lane), sensors, (t0_s, down_s), horizon_s, warned_s), t0_s),
+        _since(warned_s, t0_s),
         float(error_m[from_fault].max(initial=0.0)),
-        float(error_m[unsaid].max(initial=0.0)),
+        float(error_m[unwarned].max(initial=0.0)),
         verdict_of(landing),
         finite_or_none(off),
     )
@@ -197,9 +197,9 @@ def flown_error(history: Array, lane: int) -> Array:
     """Horizontal error of the estimate used by the autopilot, relative to the believed place of the pad (epochs,) [m];
     in flight.
     """
-    said, true = (history[:, columns(table, POSITION_NED), lane][:, :2] for table in ("estimate", "truth"))
+    stated, true = (history[:, columns(table, POSITION_NED), lane][:, :2] for table in ("estimate", "truth"))
     airborne = history[:, column("truth", "contact_n"), lane] <= 0.0
-    return np.where(airborne, np.hypot(*(said - true).T), np.nan)
+    return np.where(airborne, np.hypot(*(stated - true).T), np.nan)
 
 
 def touched_s(history: Array, landing: Array, lane: int, t0_s: float) -> float:
@@ -217,7 +217,7 @@ def first_warning(events: Array, t0_s: float, t1_s: float, horizon_s: float) -> 
 
 
 def first_refusals(
-    offers: Array, sensors: tuple[Sensor, ...], window_s: tuple[float, float], horizon_s: float, said_s: float | None
+    offers: Array, sensors: tuple[Sensor, ...], window_s: tuple[float, float], horizon_s: float, warned_s: float | None
 ) -> float | None:
     """Time at which more readings of the struck sensors than ever before had been refused within a second, or of a
     warning.
@@ -230,7 +230,7 @@ def first_refusals(
     count = np.arange(len(times)) - np.searchsorted(times, times - WITHIN_S, side="right") + 1
     usual = count[times < t0_s].max(initial=0)
     after = times[(times >= t0_s) & (times < t1_s) & (count > usual)]
-    found = [t_s for t_s in (after[0] if len(after) else None, said_s) if t_s is not None]
+    found = [t_s for t_s in (after[0] if len(after) else None, warned_s) if t_s is not None]
     return float(min(found)) if found else None
 
 

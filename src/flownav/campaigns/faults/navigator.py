@@ -18,7 +18,7 @@ from flownav.navigation.feed import equipment_of
 from flownav.navigation.flags import Flag, flags_of
 from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.rows import EstimateRow, InnovationRow
-from flownav.navigation.settings_of import Told
+from flownav.navigation.settings_of import GivenSettings
 from flownav.navigation.tables import Written, written_on
 from flownav.navigation.tape import EVENT_NAMES, new_tape
 from flownav.replays.prepare import Prepared, ReplayOptions, prepare
@@ -74,12 +74,12 @@ Navigate = Callable[[Mapping[Sensor, Stream]], Navigated]
 TAKEN_IN = (Reason.FUSED, Reason.DATUM)
 
 
-def navigator_told(told: Told) -> Navigate:
+def navigator_with(given: GivenSettings) -> Navigate:
     """The navigator with these settings; streams state the delays of their readings."""
 
     def navigate(streams: Mapping[Sensor, Stream]) -> Navigated:
         """Raises InputError where the filter never starts."""
-        prepared, queue, running = started(streams, told)
+        prepared, queue, running = started(streams, given)
         with announce_compilation("faults", "the navigator, once, about 20 s"):
             run(queue, running)
         written = written_on(running.tape)
@@ -90,13 +90,13 @@ def navigator_told(told: Told) -> Navigate:
     return navigate
 
 
-def started(streams: Mapping[Sensor, Stream], told: Told) -> tuple[Prepared, EventQueue, Running]:
+def started(streams: Mapping[Sensor, Stream], given: GivenSettings) -> tuple[Prepared, EventQueue, Running]:
     """The streams as they are fed, and a navigator that waits for them."""
     aged = ReplayOptions(_gps_delay(streams), identified=_flow_as_it_is(streams))
     prepared = prepare(Log(Path("faults"), dict(streams)), aged)
     queue = as_fed(prepared.streams)
-    equipment = equipment_of(prepared.streams, float(queue.t_s[0]), prepared.flow_gyro_is_imu, told.settings)
-    return prepared, queue, start_navigator(equipment, told.settings, new_tape(queue), told.noise)
+    equipment = equipment_of(prepared.streams, float(queue.t_s[0]), prepared.flow_gyro_is_imu, given.settings)
+    return prepared, queue, start_navigator(equipment, given.settings, new_tape(queue), given.noise)
 
 
 def navigator_of(setup: Setup) -> Navigate:
@@ -106,7 +106,7 @@ def navigator_of(setup: Setup) -> Navigate:
     """
     if setup.fitted is None:
         raise ValueError(f"{setup.scenario.name}: the paper's filter flies, and no navigator")
-    return navigator_told(setup.fitted.told)
+    return navigator_with(setup.fitted.given)
 
 
 def _gps_delay(streams: Mapping[Sensor, Stream]) -> float:
@@ -126,15 +126,15 @@ def navigated(written: Written, prepared: Prepared) -> Navigated:
     """The written outputs in the form that the judges of faults take. A state that is no number has no standard
     deviation either.
     """
-    said = EstimateRow.of(written.estimate)
+    row = EstimateRow.of(written.estimate)
     return Navigated(
-        said.t_s,
-        said.pos_ned_m,
-        said.std_pos_ned_m,
+        row.t_s,
+        row.pos_ned_m,
+        row.std_pos_ned_m,
         offers_of(written.innovation, prepared),
         tuple(Event(t_s, *EVENT_NAMES[int(kind)][:2]) for t_s, kind, _ in written.event.tolist()),
         flags_of(written.event),
-        said.protection_m,
+        row.protection_m,
     )
 
 

@@ -107,9 +107,9 @@ def _signs(run: Navigated, sensors: tuple[Sensor, ...]) -> list[tuple[float, str
     offers = run.offers
     rejected = np.flatnonzero(~offers.fused & np.isin(offers.sensor, [int(sensor) for sensor in sensors]))
     signs = [(float(offers.t_s[k]), Sensor(offers.sensor[k]).name.lower(), str(offers.reason[k])) for k in rejected]
-    said = [(event.t_s, event.source, event.kind) for event in run.events]
-    said += [(flag.t0_s, flag.source, flag.kind) for flag in run.flags]
-    return signs + [sign for sign in said if sign[1] in sources or sign[1] == FILTER]
+    reported = [(event.t_s, event.source, event.kind) for event in run.events]
+    reported += [(flag.t0_s, flag.source, flag.kind) for flag in run.flags]
+    return signs + [sign for sign in reported if sign[1] in sources or sign[1] == FILTER]
 
 
 # -- taken in ----------------------------------------------------------------------------------------------
@@ -124,20 +124,20 @@ def wrongly_fused(run: Navigated, clean: Stream, faulty: Stream) -> int:
     fused = Counter((_stamp(offers.t_s[k]), int(offers.component[k])) for k in here)
     wrong: dict[int, int] = {}
     for component in {component for _, component in fused}:
-        given, good = Counter(_said(faulty, component)), Counter(_said(clean, component))
+        given, good = Counter(_reported(faulty, component)), Counter(_reported(clean, component))
         bad: Counter[int] = Counter()
         fine: Counter[int] = Counter()
-        for said, count in given.items():
-            right = min(count, good[said])
-            fine[said[0]] += right
-            bad[said[0]] += count - right
+        for reported, count in given.items():
+            right = min(count, good[reported])
+            fine[reported[0]] += right
+            bad[reported[0]] += count - right
         for stamp, count in bad.items():
             taken = min(count, max(0, fused[stamp, component] - fine[stamp]))
             wrong[stamp] = max(taken, wrong.get(stamp, 0))
     return sum(wrong.values())
 
 
-def _said(stream: Stream, component: int) -> list[tuple[int, bytes]]:
+def _reported(stream: Stream, component: int) -> list[tuple[int, bytes]]:
     """Time stamp and bytes of each reading's component; of the whole reading where a component belongs to all of it."""
     columns = slice(component, component + 1) if stream.sensor in BY_COLUMN else slice(None)
     content = np.column_stack([stream.value[:, columns], stream.variance[:, columns], stream.quality])
@@ -194,13 +194,13 @@ def touchdown_error(course: Course, truth: Table) -> float | None:
 
 def unflagged(run: Navigated, course: Course, t0_s: float) -> float:
     """The longest time from t0 on that the error is beyond 3 sigma before any event or flag."""
-    said = np.array([event.t_s for event in run.events] + [flag.t0_s for flag in run.flags])
+    reported = np.array([event.t_s for event in run.events] + [flag.t0_s for flag in run.flags])
     longest = 0.0
     for first, last in _stretches(course.beyond & (course.t_s >= t0_s)):
         start, end = course.t_s[first], course.t_s[last]
         if any(flag.t0_s <= start < flag.t1_s for flag in run.flags):
             continue
-        in_it = said[(said >= start) & (said <= end)]
+        in_it = reported[(reported >= start) & (reported <= end)]
         longest = max(longest, float(in_it.min(initial=end) - start))
     return longest
 

@@ -202,11 +202,11 @@ def estimate_rare(
         flown.append(walker.flown)
         left -= walker.flown
     probability, low, high, cv = together_with(found)
-    said = [_said(*each) for each in zip(responses, found, flown, strict=True)]
+    facts = [_facts(*each) for each in zip(responses, found, flown, strict=True)]
     inputs, noise = ([], []) if probability == 0.0 else differences(space, found)
     branch, at = (None, None) if probability == 0.0 else most_likely(space, responses, found, inputs)
     flights, spread = USUAL_FLIGHTS + sum(flown), finite_or_none(cv)
-    return Rare(str(event), probability, low, high, spread, flights, said, inputs, noise, branch, at)
+    return Rare(str(event), probability, low, high, spread, flights, facts, inputs, noise, branch, at)
 
 
 def _respond(
@@ -241,13 +241,15 @@ def most_likely(
     """
     part = int(np.argmax([one.probability for one in found]))
     beyond = found[part].beyond
-    telling = [space.names.index(row["input"]) for row in inputs]
-    far = (beyond.inputs[:, telling] ** 2).sum(axis=1) if telling else beyond.response - responses[part].limit
+    likely_inputs = [space.names.index(row["input"]) for row in inputs]
+    far = (
+        (beyond.inputs[:, likely_inputs] ** 2).sum(axis=1) if likely_inputs else beyond.response - responses[part].limit
+    )
     chosen = int(np.argmin(far))
     return space.branch(beyond.inputs[chosen], beyond.streams[chosen]), float(beyond.response[chosen])
 
 
-def _said(response: Response, found: Found, flights: int) -> dict[str, Any]:
+def _facts(response: Response, found: Found, flights: int) -> dict[str, Any]:
     """One part of the event."""
     numbers = {"probability": found.probability, "low": found.low, "high": found.high, "cv": finite_or_none(found.cv)}
     levels = [{"level": finite_or_none(level), "share": finite_or_none(share)} for level, share in found.levels]

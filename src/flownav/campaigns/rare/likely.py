@@ -106,7 +106,7 @@ def severity(rows: Array, limits: Limits, typical: Array, failed: NDArray[np.boo
 # -- how its flights differ from all flights ---------------------------------------------------------------------
 WINDOW_S = 0.5
 NORMALS_READ = 20_000_000  # of the noise that is looked at
-MOST_TOLD = 10
+MOST_NAMED = 10
 CHANCE_NATS = 10.0  # over the number of flights: what chance alone hardly ever makes of one number
 
 
@@ -133,10 +133,15 @@ def rank_inputs(names: list[str], inputs: Array, weights: Array, independent: fl
     independent flights.
     """
     mean, spread = moments(inputs, weights)
-    said = nats(mean, spread)
-    order = [k for k in np.argsort(-said) if said[k] > CHANCE_NATS / independent][:MOST_TOLD]
+    information = nats(mean, spread)
+    order = [k for k in np.argsort(-information) if information[k] > CHANCE_NATS / independent][:MOST_NAMED]
     return [
-        {"input": names[k], "mean_sigma": float(mean[k]), "spread_sigma": float(spread[k]), "nats": float(said[k])}
+        {
+            "input": names[k],
+            "mean_sigma": float(mean[k]),
+            "spread_sigma": float(spread[k]),
+            "nats": float(information[k]),
+        }
         for k in order
     ]
 
@@ -157,9 +162,9 @@ def rank_noise(flight: Flight, seed: int, states: States, weights: Array, indepe
     for source in sources:
         sums, ends_s = window_sums(source, flight.plan.epochs, seed, streams)
         mean, spread = moments(sums, weights)
-        said = nats(mean, spread)
-        k = int(np.argmax(said))
-        if said[k] > CHANCE_NATS / independent:
+        information = nats(mean, spread)
+        k = int(np.argmax(information))
+        if information[k] > CHANCE_NATS / independent:
             rows.append(
                 {
                     "source": source.name,
@@ -167,10 +172,10 @@ def rank_noise(flight: Flight, seed: int, states: States, weights: Array, indepe
                     "to_s": float(ends_s[k]),
                     "mean_sigma": float(mean[k]),
                     "spread_sigma": float(spread[k]),
-                    "nats": float(said[k]),
+                    "nats": float(information[k]),
                 }
             )
-    return sorted(rows, key=lambda row: -row["nats"])[:MOST_TOLD]
+    return sorted(rows, key=lambda row: -row["nats"])[:MOST_NAMED]
 
 
 def window_sums(source: Source, epochs: int, seed: int, streams: NDArray[np.int64]) -> tuple[Array, Array]:

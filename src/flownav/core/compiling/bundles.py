@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hint
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.compiling.engine import equation, spelled
+from flownav.core.compiling.engine import equation, intrinsic
 
 
 def write_function(name: str, source: str, scope: dict[str, Any]) -> Callable[..., Any]:
@@ -38,12 +38,12 @@ def lane_access(bundle: type, row: int | Sequence[int] | None) -> tuple[Callable
     rows = None if row is None else tuple(range(row, row + len(fields)) if isinstance(row, int) else row)
     places = [f"(row + {i})" for i in range(len(fields))] if rows is None else list(map(str, rows))
     at = [f"work[{place} * len(lanes) + lane]" for place in places]
-    told = "work, lanes, lane" if row is not None else "work, lanes, row, lane"
+    arguments = "work, lanes, lane" if row is not None else "work, lanes, row, lane"
     stores = "\n".join(f"    {place} = value.{name}" for place, name in zip(at, fields, strict=True))
     scope: dict[str, Any] = {"bundle": bundle}
-    load = write_function("load", f"def load({told}):\n    return bundle({', '.join(at)})\n", scope)
-    store = write_function("store", f"def store({told}, value):\n{stores}\n", scope)
-    return spelled(load, "load_spelled", bundle, rows), spelled(store, "store_spelled", bundle, rows)
+    load = write_function("load", f"def load({arguments}):\n    return bundle({', '.join(at)})\n", scope)
+    store = write_function("store", f"def store({arguments}, value):\n{stores}\n", scope)
+    return intrinsic(load, "load_intrinsic", bundle, rows), intrinsic(store, "store_intrinsic", bundle, rows)
 
 
 Bundle = TypeVar("Bundle", bound=tuple[Any, ...])
@@ -57,7 +57,7 @@ def replacing(bundle: type[Bundle], *names: str) -> Callable[..., Bundle]:
     fields = _known(bundle, names)
     values = ", ".join(name if name in names else f"value.{name}" for name in fields)
     source = f"def replaced(value, {', '.join(names)}):\n    return bundle({values})\n"
-    return spelled(write_function("replaced", source, {"bundle": bundle}), "replaced_spelled", bundle, names)
+    return intrinsic(write_function("replaced", source, {"bundle": bundle}), "replaced_intrinsic", bundle, names)
 
 
 def passing(bundle: type[Bundle], through: Callable[..., float], *names: str) -> Callable[[Bundle], Bundle]:

@@ -51,7 +51,7 @@ class Store:
         self.own = own / "kernels"
         self.shipped = shipped
         self.sources = Sources(own / "sources.json")
-        self._told: set[str] = set()
+        self._printed: set[str] = set()
         self._usable = True
 
     def load(self, name: str) -> bytes | None:
@@ -102,7 +102,7 @@ class Store:
 
     def damaged(self, name: str, why: str) -> None:
         """Report that a file is damaged; it is compiled anew and replaced."""
-        self._tell(f"the cached kernel {name.split('-')[0]} is damaged ({why}): compiling it anew")
+        self._print(f"the cached kernel {name.split('-')[0]} is damaged ({why}): compiling it anew")
 
     def _read(self, path: Path, shipped: bool) -> bytes | None:
         try:
@@ -129,11 +129,11 @@ class Store:
 
     def _give_up(self, why: str) -> None:
         self._usable = False
-        self._tell(f"compiled kernels are not kept in {self.own} ({why}); FLOWNAV_CACHE can name another folder")
+        self._print(f"compiled kernels are not kept in {self.own} ({why}); FLOWNAV_CACHE can name another folder")
 
-    def _tell(self, message: str) -> None:
-        if message not in self._told:
-            self._told.add(message)
+    def _print(self, message: str) -> None:
+        if message not in self._printed:
+            self._printed.add(message)
             print(f"flownav: {message}", file=sys.stderr, flush=True)
 
     def _prune(self) -> None:
@@ -155,13 +155,13 @@ def _mark_used(path: Path) -> None:
 STORE = Store(cache_folder(), SHIPPED)
 
 
-def depends_also(module: str, laws: Collection[Callable[..., Any]], said: str) -> None:
+def depends_also(module: str, laws: Collection[Callable[..., Any]], reason: str) -> None:
     """Note that all code compiled from a module is, in this process, also made of these laws, and of the text
     `said`.
     """
     generated = " ".join(law.__code__.co_filename for law in laws if law.__code__.co_filename.startswith("<flownav"))
     others = {law.__module__ for law in laws if not law.__code__.co_filename.startswith("<flownav")}
-    STORE.sources.extend(module, others, f"{said} {generated}")
+    STORE.sources.extend(module, others, f"{reason} {generated}")
 
 
 def file_name(function: Callable[..., Any], constants: dict[str, Any], kinds: str) -> str | None:
@@ -186,8 +186,8 @@ def _modules(function: Callable[..., Any], constants: dict[str, Any]) -> Iterato
     """The function's module; those of the functions and classes it names, which matter if it is a generated one."""
     yield "flownav.core.compile"
     yield "flownav.core.compiling.compiler"
-    yield "flownav.core.compiling.taught"
-    yield "flownav.core.compiling.spelled"
+    yield "flownav.core.compiling.extensions"
+    yield "flownav.core.compiling.intrinsics"
     yield function.__module__
     named = [function.__globals__.get(name) for name in function.__code__.co_names]
     for value in [*named, *constants.values(), *inspect.getclosurevars(function).nonlocals.values()]:

@@ -24,7 +24,7 @@ LIBRARIES = tuple({sys.prefix, sys.base_prefix, sys.exec_prefix})
 INSTALLED = frozenset({"site-packages", "dist-packages"})
 OTHERS_WRITE = 0o022  # of group and others, in a mode
 OWN_FILE, OWN_FOLDER = 0o600, 0o700  # modes of what is kept, whatever the umask
-REMEMBERED_FILES = 2000
+KEPT_FILES = 2000
 START_S = time.time()
 # imported by every kernel's module through `flownav.core.compile`, and nothing in machine code comes from them
 WITHOUT_CODE = {
@@ -55,10 +55,10 @@ class Sources:
         self._more: dict[str, tuple[str, frozenset[str]]] = {}
         self._seen: dict[str, tuple[tuple[int, int], Source]] = {}
 
-    def extend(self, module: str, more: Iterable[str], said: str) -> None:
+    def extend(self, module: str, more: Iterable[str], reason: str) -> None:
         """From now on a module also contains these others, and the text `said`; in this process only."""
         text, others = self._more.get(module, ("", frozenset()))
-        self._more[module] = f"{text} {said}", others | set(more)
+        self._more[module] = f"{text} {reason}", others | set(more)
         self._stamps.clear()
 
     def closure(self, modules: Iterable[str]) -> dict[str, str]:
@@ -115,7 +115,7 @@ class Sources:
         if not self._learnt or self._known is None:
             return
         self._learnt = False
-        newest = list(self._known.items())[-REMEMBERED_FILES:]
+        newest = list(self._known.items())[-KEPT_FILES:]
         try:
             if distrusted_folder(self._memory.parent, sticky=True):
                 return

@@ -10,7 +10,7 @@ import threading
 from collections.abc import Callable
 from importlib import import_module
 
-TAUGHT = "flownav.core.compiling.taught"  # by name: what it imports has left word here
+EXTENSIONS = "flownav.core.compiling.extensions"  # by name: what it imports has left word here
 _lock = threading.RLock()
 _waiting: list[Callable[[], object]] = []
 _begun = False
@@ -32,7 +32,7 @@ def begin_compiling() -> None:
     with _lock:
         if not _begun:
             _begun = True
-            import_module(TAUGHT)
+            import_module(EXTENSIONS)
         _declare()
 
 

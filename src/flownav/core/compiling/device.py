@@ -82,7 +82,7 @@ def _device_named(capability: tuple[int, int, str]) -> Iterator[None]:
         dispatcher.get_current_device = before
 
 
-class _Taught:
+class _Extensions:
     """Equations that numba-cuda knows already as device functions, which must be kept alive."""
 
     functions: dict[Callable[..., Any], Any] = {}  # noqa: RUF012
@@ -98,11 +98,11 @@ def teach_equations() -> None:
     context = cuda_target.typing_context
     context.refresh()
     for function, inlined in EQUATIONS.items():
-        if function not in _Taught.functions:
-            _Taught.functions[function] = cuda.jit(device=True, forceinline=inlined, lto=False)(
+        if function not in _Extensions.functions:
+            _Extensions.functions[function] = cuda.jit(device=True, forceinline=inlined, lto=False)(
                 inspect.unwrap(function)
             )
-            _say(context, function, types.Dispatcher(_Taught.functions[function]))
+            _say(context, function, types.Dispatcher(_Extensions.functions[function]))
 
 
 def call_instead(function: Callable[..., None]) -> None:
@@ -111,7 +111,7 @@ def call_instead(function: Callable[..., None]) -> None:
     from numba.cuda.descriptor import cuda_target
 
     teach_equations()
-    _say(cuda_target.typing_context, invoke, types.Dispatcher(_Taught.functions[function]))
+    _say(cuda_target.typing_context, invoke, types.Dispatcher(_Extensions.functions[function]))
 
 
 def _say(context: Any, function: Callable[..., Any], kind: Any) -> None:

@@ -50,10 +50,10 @@ def elementary(of_numpy: Callable[..., Any]) -> Callable[[Function], Function]:
 
     def made(law: Function) -> Function:
         @wraps(law)
-        def function(*told: Any) -> Any:
-            if not all(isinstance(value, float | int) for value in told):
-                return of_numpy(*told)
-            return np.float64(law(*map(float, told)))
+        def function(*values: Any) -> Any:
+            if not all(isinstance(value, float | int) for value in values):
+                return of_numpy(*values)
+            return np.float64(law(*map(float, values)))
 
         return stands_for(law, function)  # type: ignore[return-value]
 

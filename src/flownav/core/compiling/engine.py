@@ -27,34 +27,34 @@ EQUATIONS: dict[Callable[..., Any], bool] = {}  # every equation (True) and proc
 def equation(function: Function) -> Function:
     """A scalar law: plain Python where Python calls it, compiled and inlined where a kernel does."""
     EQUATIONS[function] = True
-    _tell("compiler", "inlined", function)
+    _defer("compiler", "inlined", function)
     return function
 
 
 def stands_for(law: Callable[..., Any], function: Function) -> Function:
     """A function that Python calls as it is, where kernels inline the law (what it wraps)."""
     EQUATIONS[function] = True
-    _tell("compiler", "inlined_for", law, function)
+    _defer("compiler", "inlined_for", law, function)
     return function
 
 
-def spelled(function: Function, how: str, *told: Any) -> Function:
-    """A function that kernels get as instructions, which `how` of the module `spelled` writes, called with `told`.
+def intrinsic(function: Function, how: str, *details: Any) -> Function:
+    """A function that kernels get as instructions, which `how` of the module `intrinsics` writes, called with `told`.
 
     With `FLOWNAV_PLAIN=1` it is an equation as any other, as it is for another target's compiler.
     """
     EQUATIONS[function] = True
     if Leanness.wanted:
-        _tell("spelled", how, function, *told)
+        _defer("intrinsics", how, function, *details)
     else:
-        _tell("compiler", "inlined", function)
+        _defer("compiler", "inlined", function)
     return function
 
 
 def procedure(function: Function) -> Function:
     """An equation too long to be inlined: kernels call it, and it is compiled once for each type of its arguments."""
     EQUATIONS[function] = False
-    _tell("compiler", "called", function)
+    _defer("compiler", "called", function)
     return function
 
 
@@ -63,9 +63,9 @@ def kernel(function: Function) -> Function:
     return function if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0" else cast(Function, Kernel(function))
 
 
-def _tell(module: str, how: str, *told: Any) -> None:
+def _defer(module: str, how: str, *details: Any) -> None:
     """Declare to Numba, before anything is compiled, by a function of one of the modules that have it."""
-    when_compiling(lambda: getattr(import_module(f"flownav.core.compiling.{module}"), how)(*told))
+    when_compiling(lambda: getattr(import_module(f"flownav.core.compiling.{module}"), how)(*details))
 
 
 def compiler() -> Any:

@@ -32,10 +32,10 @@ def per_thread(function: Callable[..., None], constants: Constants) -> Callable[
     """The kernel whose every thread calls this equation; constants: parameters fixed in it."""
     from numba import cuda
 
-    told = told_names(function, constants)
-    given = ", ".join(f"{name}={name}" for name in (*told, *constants))
+    named = argument_names(function, constants)
+    given = ", ".join(f"{name}={name}" for name in (*named, *constants))
     source = (
-        f"def kernel(threads, {', '.join(told)}):\n"
+        f"def kernel(threads, {', '.join(named)}):\n"
         "    thread = cuda.grid(1)\n"
         "    if thread < threads:\n"
         f"        function(thread, threads, {given})\n"
@@ -43,7 +43,7 @@ def per_thread(function: Callable[..., None], constants: Constants) -> Callable[
     return write_function("kernel", source, {"cuda": cuda, "function": function, **constants})
 
 
-def told_names(function: Callable[..., None], constants: Constants) -> list[str]:
+def argument_names(function: Callable[..., None], constants: Constants) -> list[str]:
     """The parameters of a function of one thread that its caller passes, in order."""
     return [name for name in list(inspect.signature(function).parameters)[2:] if name not in constants]
 
@@ -135,11 +135,11 @@ class Gpu:
         """A NumPy copy of a device's array."""
         return array.copy_to_host()
 
-    def run(self, function: Callable[..., None], threads: int, told: dict[str, Any], constants: Constants) -> None:
+    def run(self, function: Callable[..., None], threads: int, named: dict[str, Any], constants: Constants) -> None:
         """`function(thread, threads, **told, **constants)` for each thread, and wait for the last."""
         from cuda.core import LaunchConfig, ObjectCode, launch
 
-        arguments = (threads, *(told[name] for name in told_names(function, constants)))
+        arguments = (threads, *(named[name] for name in argument_names(function, constants)))
         code = compiled(function, constants, tuple(map(argument_type, arguments)), self.capability)
         known = hashlib.sha256(code.cubin).hexdigest()
         if known not in self._kernels:
@@ -180,12 +180,12 @@ class Simulator:
         """A copy of the array."""
         return array.copy()
 
-    def run(self, function: Callable[..., None], threads: int, told: dict[str, Any], constants: Constants) -> None:
+    def run(self, function: Callable[..., None], threads: int, named: dict[str, Any], constants: Constants) -> None:
         """`function(thread, threads, **told, **constants)` for each thread."""
         from numba import cuda
 
         kernel = cuda.jit(per_thread(function, constants))
-        kernel[-(-threads // WARP), WARP](threads, *(told[name] for name in told_names(function, constants)))
+        kernel[-(-threads // WARP), WARP](threads, *(named[name] for name in argument_names(function, constants)))
 
 
 def compiled(
@@ -215,5 +215,5 @@ def _file_name(
         return None
     stem, digest = host.removesuffix(SUFFIX).rsplit("-", 1)
     made_by = b"".join(Path(file).read_bytes() for file in (__file__, device.__file__))
-    told = f"{digest} sm_{capability[0]}{capability[1]} numba-cuda {numba_cuda.__version__}\n".encode() + made_by
-    return f"{stem}-{hashlib.sha256(told).hexdigest()[:24]}{SUFFIX}"
+    named = f"{digest} sm_{capability[0]}{capability[1]} numba-cuda {numba_cuda.__version__}\n".encode() + made_by
+    return f"{stem}-{hashlib.sha256(named).hexdigest()[:24]}{SUFFIX}"

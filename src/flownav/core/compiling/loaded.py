@@ -133,15 +133,15 @@ def _linked(code: MachineCode) -> tuple[int, list[Any]]:
         library.export_symbol(environment.symbol)
     linked = library.link(linker, f"flownav {len(_alive)}")
     environments = [_environment(environment) for environment in code.environments]
-    for told, made in zip(code.environments, environments, strict=True):
-        c_void_p.from_address(linked[told.symbol]).value = id(made)
+    for described, made in zip(code.environments, environments, strict=True):
+        c_void_p.from_address(linked[described.symbol]).value = id(made)
     _alive.append((linked, environments))
     return int(linked[code.entry]), environments
 
 
-def _environment(told: Environment) -> Any:
-    made = runtime().functions.Environment(vars(import_module(told.module)))
-    made.consts[:] = told.constants
+def _environment(described: Environment) -> Any:
+    made = runtime().functions.Environment(vars(import_module(described.module)))
+    made.consts[:] = described.constants
     return made
 
 

@@ -31,7 +31,7 @@ from numba.core.untyped_passes import (
     TranslateByteCode,
 )
 
-from flownav.core.compiling.remembered import is_counted
+from flownav.core.compiling.memo import is_counted
 
 PRESENT = (types.BaseTuple, types.CPointer, types.Array)
 

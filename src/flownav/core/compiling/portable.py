@@ -221,9 +221,9 @@ def kept_code(
 ) -> bytes:  # fmt: skip
     """`machine_code` of `raw_code`, kept beside it: the second time it takes no time."""
     raw = raw_code(entries)
-    told = repr((hashlib.sha256(raw.encode()).hexdigest(), tuple(processor), symbols, without, apart, INLINING))
+    key = repr((hashlib.sha256(raw.encode()).hexdigest(), tuple(processor), symbols, without, apart, INLINING))
     source = hashlib.sha256(inspect.getsource(sys.modules[__name__]).encode()).hexdigest()
-    name = f"onboard-{hashlib.sha256(f'{told} {source} {VERSIONS}'.encode()).hexdigest()[:24]}.kernel"
+    name = f"onboard-{hashlib.sha256(f'{key} {source} {VERSIONS}'.encode()).hexdigest()[:24]}.kernel"
     kept = STORE.load(name)
     if kept is None:
         with compiling(f"the navigator for {processor.triple}"):

@@ -44,7 +44,7 @@ class _Kept(NamedTuple):
 
     load: Callable[..., Any]
     store: Callable[..., Any] | None
-    told: tuple[str, ...]
+    by_keyword: tuple[str, ...]
     buffer: str = "work"
 
 
@@ -90,9 +90,9 @@ class Layout:
         self._rows[record] = rows
         self._kept[record] = _Kept(*lane_access(record, rows), ())
 
-    def derive(self, record: Any, found: Callable[..., Any], *told: str) -> None:
+    def derive(self, record: Any, found: Callable[..., Any], *by_keyword: str) -> None:
         """A record that is not stored: `found(work, lanes, *told, lane)` computes it."""
-        self._kept[record] = _Kept(found, None, told)
+        self._kept[record] = _Kept(found, None, by_keyword)
 
     def see(self, law: Callable[..., Any]) -> None:
         """A record that is not stored: the result of a law of other records of this layout, and of the law's
@@ -100,8 +100,10 @@ class Layout:
         """
         plan = _Plan(self, law)
         passed = plan.passed(law)
-        source = f"def found({', '.join(['work', 'lanes', *plan.told, 'lane'])}):\n    return law({passed})\n"
-        self.derive(get_type_hints(law)["return"], equation(write_function("found", source, plan.scope)), *plan.told)
+        source = f"def found({', '.join(['work', 'lanes', *plan.by_keyword, 'lane'])}):\n    return law({passed})\n"
+        self.derive(
+            get_type_hints(law)["return"], equation(write_function("found", source, plan.scope)), *plan.by_keyword
+        )
 
     def anywhere(self, record: Any, row: str) -> tuple[Callable[..., Any], Callable[..., Any]]:
         """A record whose first row the caller passes by the name `row`; its access, `load(work, lanes, row, lane)`."""
@@ -181,12 +183,12 @@ class _Plan:
     def __init__(self, layout: Layout, function: Callable[..., Any]) -> None:
         self.layout, self.name = layout, function.__name__
         self.scope: dict[str, Any] = {"law": compiled(function)}
-        self.told = [p.name for p in parameters(function) if p.kind is p.KEYWORD_ONLY]
+        self.by_keyword = [p.name for p in parameters(function) if p.kind is p.KEYWORD_ONLY]
         self.truths: list[str] = []
 
     def also(self, names: tuple[str, ...]) -> str:
         """Add these names to the loop's arguments; return them as arguments of a call, each followed by a comma."""
-        self.told += [name for name in names if name not in self.told]
+        self.by_keyword += [name for name in names if name not in self.by_keyword]
         return "".join(f"{name}, " for name in names)
 
     def known(self, value: Any) -> str:
@@ -213,7 +215,7 @@ class _Plan:
     def place(self, kept: _Kept) -> str:
         """Where a record lies, as arguments of a call."""
         buffer = self.also((kept.buffer,)) if kept.buffer != "work" else "work, "
-        return f"{buffer}lanes, {self.also(kept.told)}lane"
+        return f"{buffer}lanes, {self.also(kept.by_keyword)}lane"
 
     def put(self, kind: Any, value: str) -> list[str]:
         """Lines that store what was returned, or pass it to its sink."""
@@ -245,8 +247,8 @@ def _generated(layout: Layout, function: Callable[..., Any]) -> OnLanes[..., Any
         raise TypeError(f"{function.__name__}: what the caller tells has no defaults")
     plan, result = _Plan(layout, function), get_type_hints(function)["return"]
     lines = [f"found = law({plan.passed(function)})", *plan.put(result, "found")]
-    told = sorted(plan.told, key=lambda name: (name != "t_s", name == "o"))  # as the house has them
-    source = [f"def run({', '.join(['work', 'lanes', *told])}):"]
+    by_keyword = sorted(plan.by_keyword, key=lambda name: (name != "t_s", name == "o"))  # as the house has them
+    source = [f"def run({', '.join(['work', 'lanes', *by_keyword])}):"]
     source += [f"    {truth} = False" for truth in plan.truths]
     source += ["    for lane in range(len(lanes)):", *(f"        {line}" for line in lines)]
     source += [f"    return {' or '.join(plan.truths)}"] if plan.truths else []

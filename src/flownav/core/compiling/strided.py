@@ -49,8 +49,8 @@ def teach_strided_pointers() -> None:
 
     @register_model(StridedType)
     class _Model(core_models.PrimitiveModel):  # type: ignore[misc]
-        def __init__(self, manager: Any, told: Any) -> None:
-            super().__init__(manager, told, ir.DoubleType().as_pointer())
+        def __init__(self, manager: Any, record: Any) -> None:
+            super().__init__(manager, record, ir.DoubleType().as_pointer())
 
     _teach_types(StridedType())
     _teach_code(StridedType)
@@ -136,5 +136,5 @@ class Runner(Protocol):
     def fetch(self, array: Any) -> Any:
         """A NumPy copy of a device's array."""
 
-    def run(self, function: Callable[..., None], threads: int, told: dict[str, Any], constants: Constants) -> None:
+    def run(self, function: Callable[..., None], threads: int, named: dict[str, Any], constants: Constants) -> None:
         """`function(thread, threads, **told, **constants)` for each thread; arrays in `told` are the device's."""

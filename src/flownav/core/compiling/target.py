@@ -32,7 +32,7 @@ from numba.core.runtime.nrt import rtsys
 
 from flownav.core.compiling.level import LLVM_OPTIONS, Leanness, level
 from flownav.core.compiling.loops import has_loop, jumps_back
-from flownav.core.compiling.remembered import remembering
+from flownav.core.compiling.memo import memoising
 
 COLLECT_AFTER = 50_000  # objects; Python's own 700 costs a tenth of the time of a compilation
 ENVIRONMENT_SYMBOL = "_ZN08NumbaEnv"
@@ -252,7 +252,7 @@ def lean() -> Iterator[None]:
         before = context._internal_codegen
         context._internal_codegen = _codegen() if is_lean() else before
         try:
-            with remembering(), rarely_collecting():
+            with memoising(), rarely_collecting():
                 yield
         finally:
             context._internal_codegen = before

@@ -37,7 +37,7 @@ class Board:
         self._code = code_here(lag)
         own = self.work, self.rings, self.settings
         self._taken = addresses(*own, self._at, self._reading, self._head, self._innovation, self._event)
-        self._told = addresses(*own, self._at, self._now)
+        self._addresses = addresses(*own, self._at, self._now)
         self._code["begin"](*addresses(*own))
 
     def take(self, given: Given) -> Outcome:
@@ -56,9 +56,9 @@ class Board:
     def now(self, t_s: float) -> NowRow[Array]:
         """The state at an instant, as `flownav_now`."""
         self._at[0] = t_s
-        self._code["now"](*self._told)
-        told: NowRow[Array] = now_row(self._now.copy())
-        return told
+        self._code["now"](*self._addresses)
+        row: NowRow[Array] = now_row(self._now.copy())
+        return row
 
     def digest(self) -> int:
         """As `flownav_digest`."""

@@ -205,7 +205,7 @@ def script() -> dict[str, Any]:
     numbers = {
         "reading": width_of(waiting_records.BoardReading), "innovations": onboard.MOST_INNOVATIONS,
         "events": onboard.MOST_EVENTS, "work": progress.BOARD_ROWS, "first_row": waiting.FIRST_ROW,
-        "inertial": waiting.INERTIAL, "stored": waiting.STORED, "told": waiting.TOLD,
+        "inertial": waiting.INERTIAL, "stored": waiting.STORED, "told": waiting.ATTITUDE_FIELDS,
     }  # fmt: skip
     layouts = {
         name: json.dumps(

@@ -27,11 +27,11 @@ from flownav.export.onboard.page import page_of
 from flownav.logs.log import FedSegment
 from flownav.navigation import progress, waiting
 from flownav.navigation.feed import rate_hz
+from flownav.navigation.kernel_settings import NO_STATED_NOISE, Equipment, FlowNoise, carries_lag
 from flownav.navigation.loop import start_navigator
 from flownav.navigation.rings import Given, given_of
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tape import empty_tape
-from flownav.navigation.told import NO_STATED_NOISE, Equipment, FlowNoise, carries_lag
 from flownav.navigation.waiting_records import Sizes
 
 MANIFEST = "manifest.json"
@@ -105,7 +105,7 @@ def packed_settings(flight: Flight, pace: progress.Pace) -> tuple[Array, bool]:
     A navigator on board waits for its first fix from its first reading on.
     """
     on = start_navigator(Equipment(**flight.segment.equipment), flight.settings, empty_tape(0, 0, 0), flight.flow_noise)
-    return np.concatenate([on.settings, pace]), bool(carries_lag(on.told.flow))
+    return np.concatenate([on.settings, pace]), bool(carries_lag(on.given.flow))
 
 
 def pace_of(settings: NavigatorSettingsFile, horizon_s: float, without: tuple[str, ...] = ()) -> progress.Pace:
@@ -119,11 +119,11 @@ def rates_of(segment: FedSegment, horizon_s: float) -> Rates:
     together the most within a horizon; a flow looks for as long as it is from one reading to the next.
     """
     queue = segment.queue
-    inertial, told = queue.sensor == Sensor.IMU, queue.sensor == Sensor.ATTITUDE
+    inertial, attitudes = queue.sensor == Sensor.IMU, queue.sensor == Sensor.ATTITUDE
     usual = Rates(horizon_s)
     window_s = max(horizon_s, LEAST_WINDOW_S)
     others = queue.t_s if not segment.equipment["use_imu"] else queue.t_s[~inertial]
-    attitude_hz = rate_hz(queue.t_s[told]) if segment.equipment["use_attitude"] else 0.0
+    attitude_hz = rate_hz(queue.t_s[attitudes]) if segment.equipment["use_attitude"] else 0.0
     return usual._replace(
         imu_hz=_tidy(rate_hz(queue.t_s[inertial])),
         others_hz=_tidy(most_within(others, window_s) / window_s),
@@ -256,16 +256,16 @@ def _written(
     page = Environment(loader=PackageLoader(__package__, "files"), keep_trailing_newline=True, autoescape=False)
     page.filters["number"] = number
     target = targets.target_of(asked.target, asked.cpu, asked.features)
-    told = {
+    words = {
         **facts, "tested": target.tested, "names": [*files], "measured": measured(asked.target), "symbols": SYMBOLS,
         "settings": settings.tolist(), "sizes": asked.rates.sizes, **script(),
     }  # fmt: skip
     if targets.MODULE not in files:
-        return {name: page.get_template(f"{name}.j2").render(**told).encode() for name in ("README.md",)} | {
-            name: page.get_template(name).render(**told).encode() for name in ("main.c", "CMakeLists.txt")
+        return {name: page.get_template(f"{name}.j2").render(**words).encode() for name in ("README.md",)} | {
+            name: page.get_template(name).render(**words).encode() for name in ("main.c", "CMakeLists.txt")
         }
-    around = page.get_template("flownav.js.j2").render(**told)
-    readme = page.get_template("README.md.j2").render(**told)
+    around = page.get_template("flownav.js.j2").render(**words)
+    readme = page.get_template("README.md.j2").render(**words)
     whole = page_of(files[targets.MODULE], around, flight.name, built_for(flight))
     return {"README.md": readme.encode(), "flownav.js": around.encode(), "flownav.html": whole.encode()}
 

@@ -19,7 +19,7 @@ LINE = re.compile(r"\s*(\d+)\s+(?:0x)?([0-9a-fA-F]{16})\b")
 MOST_LINES = 1_000_000
 
 
-class Said(NamedTuple):
+class LoggedDigest(NamedTuple):
     """A digest that a board reported, and after how many readings (None: after all)."""
 
     readings: int | None
@@ -44,19 +44,19 @@ class Found(NamedTuple):
     said: str | None = None
 
 
-def said_by(what: str) -> list[Said]:
+def logged_digests(what: str) -> list[LoggedDigest]:
     """Digests of a text that is one, or of a file with a line for each (readings, digest). InputError where it is
     neither.
     """
     if DIGEST.fullmatch(what):
-        return [Said(None, int(what, 16))]
+        return [LoggedDigest(None, int(what, 16))]
     path = Path(what)
     if not path.is_file():
         raise InputError(
             f"{what}: neither 16 hexadecimal digits, nor a file of digests, nor a folder of `flownav build`"
         )
     text = path.read_text(encoding="utf-8", errors="replace")
-    found = [Said(int(m[1]), int(m[2], 16)) for m in map(LINE.match, text.splitlines()[:MOST_LINES]) if m]
+    found = [LoggedDigest(int(m[1]), int(m[2], 16)) for m in map(LINE.match, text.splitlines()[:MOST_LINES]) if m]
     if not found:
         raise InputError(f"{what}: no line of it is a number of readings and 16 hexadecimal digits")
     if any(b.readings <= a.readings for a, b in pairwise(found)):  # type: ignore[operator]
@@ -64,28 +64,28 @@ def said_by(what: str) -> list[Said]:
     return found
 
 
-def compare(said: Sequence[Said], given: Sequence[Given], board: Board) -> Found:
+def compare(logged: Sequence[LoggedDigest], given: Sequence[Given], board: Board) -> Found:
     """Feed the readings here, and compare each digest with the reported one. InputError where the report has more
     readings.
     """
-    last = max((each.readings for each in said if each.readings is not None), default=0)
+    last = max((each.readings for each in logged if each.readings is not None), default=0)
     if last > len(given):
         raise InputError(
             f"a digest is reported after {last} readings, and the flight has {len(given)}: it is another flight"
         )
-    after = {each.readings if each.readings is not None else len(given): each.digest for each in said}
+    after = {each.readings if each.readings is not None else len(given): each.digest for each in logged}
     equal, same = 0, 0
     for count, reading in enumerate(given, 1):
         board.take(reading)
         if count not in after:
             continue
-        if count == len(given) and said[-1].readings is None:
+        if count == len(given) and logged[-1].readings is None:
             board.finish()
         if board.digest() != after[count]:
             where = reading.t_s, Sensor(reading.sensor).name.lower()
-            return Found(len(said), equal, _hex(board), same, count, *where, _hex(board), f"{after[count]:016x}")
+            return Found(len(logged), equal, _hex(board), same, count, *where, _hex(board), f"{after[count]:016x}")
         equal, same = equal + 1, count
-    return Found(len(said), equal, _hex(board))
+    return Found(len(logged), equal, _hex(board))
 
 
 def _hex(board: Board) -> str:
@@ -98,9 +98,9 @@ def board_for(flight: Flight, rates: Rates, without: tuple[str, ...] = ()) -> Bo
     return Board(settings, rates.sizes, lag=lag)
 
 
-def verified(said: Sequence[Said], flight: Flight, rates: Rates) -> Found:
+def verified(logged: Sequence[LoggedDigest], flight: Flight, rates: Rates) -> Found:
     """Result of comparing the digests reported of a whole flight with this machine's."""
-    return compare(said, readings_of(flight), board_for(flight, rates))
+    return compare(logged, readings_of(flight), board_for(flight, rates))
 
 
 # -- a folder -------------------------------------------------------------------------------------------------

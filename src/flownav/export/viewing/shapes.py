@@ -37,8 +37,8 @@ class Camera(NamedTuple):
 
 def vehicle_outline(record: Record) -> list[Outline]:
     """Lines of the vehicle in body FRD: rotor disks, tail boom and skids, or arms and propellers; none if unknown."""
-    said = mapping(mapping(record.manifest.get("parameters")).get("vehicle"))
-    values = {str(name): number for name, entry in said.items() if (number := _number(entry)) is not None}
+    stated = mapping(mapping(record.manifest.get("parameters")).get("vehicle"))
+    values = {str(name): number for name, entry in stated.items() if (number := _number(entry)) is not None}
     if "frame.arm_m" in values and "propeller.radius_m" in values:
         return _multirotor(values)
     if "main_rotor.radius_m" in values:
@@ -167,7 +167,7 @@ def _range_at(record: Record, t_s: Array) -> Array:
     if table is None or "range_m" not in table or not len(table["t_s"]):
         return np.full(len(t_s), np.nan)
     order = np.argsort(table["t_s"], kind="stable")
-    heard_s, range_m = np.asarray(table["t_s"], float)[order], np.asarray(table["range_m"], float)[order]
-    row = np.searchsorted(heard_s, t_s, side="right") - 1
-    fresh = (row >= 0) & (t_s - heard_s[np.maximum(row, 0)] <= OLDEST_RANGE_S)
+    received_s, range_m = np.asarray(table["t_s"], float)[order], np.asarray(table["range_m"], float)[order]
+    row = np.searchsorted(received_s, t_s, side="right") - 1
+    fresh = (row >= 0) & (t_s - received_s[np.maximum(row, 0)] <= OLDEST_RANGE_S)
     return np.where(fresh, range_m[np.maximum(row, 0)], np.nan)

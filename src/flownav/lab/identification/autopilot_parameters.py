@@ -102,14 +102,14 @@ def _px4(findings: Findings) -> list[Parameter]:
 def _limits(findings: Findings, datasheet: FlowSensor) -> list[Parameter]:
     """The datasheet's limits; what the log reached beside them."""
     limits, (lowest, highest) = datasheet.limits, findings.heights_m
-    said = f"the datasheet's ({datasheet.name})"
+    source = f"the datasheet's ({datasheet.name})"
     return [
         within(LIMITS[0], float(limits.min_height_m), 0.0, 1.0, FLOAT,
-               f"m: {said}; identified from {lowest:.2f} m up (before PX4 1.9 SENS_FLOW_MINRNG)"),
+               f"m: {source}; identified from {lowest:.2f} m up (before PX4 1.9 SENS_FLOW_MINRNG)"),
         within(LIMITS[1], float(limits.max_height_m), 1.0, 100.0, FLOAT,
-               f"m: {said}; identified up to {highest:.2f} m"),
+               f"m: {source}; identified up to {highest:.2f} m"),
         within(LIMITS[2], float(limits.max_flow_rad_s), 1.0, 100.0, FLOAT,
-               f"rad/s: {said}; up to {findings.max_flow_rad_s:.2f} rad/s was seen (before PX4 1.9 EKF2_OF_RMAX)"),
+               f"rad/s: {source}; up to {findings.max_flow_rad_s:.2f} rad/s was seen (before PX4 1.9 EKF2_OF_RMAX)"),
     ]  # fmt: skip
 
 

@@ -172,7 +172,7 @@ def flight(log: Log, reference: str = "auto", axes: Array | None = None) -> Flig
             f"{log.path}: the reference ({name}) covers {reference_t_s[0]:.1f} to {reference_t_s[-1]:.1f} s, where "
             f"{np.count_nonzero(shared)} flow readings lie; at least {LEAST_FLOW} are needed, on one clock"
         )
-    ranges, untrue_said = _ranges(log)
+    ranges, untrue_notes = _ranges(log)
     range_m, near = beside(ranges, t_s - age_s)
     velocity, rate = _velocity_and_rate(sensor, value, range_m)
     velocity = velocity @ axes.T if axes is not None and turned else velocity  # back in the sensor's own axes
@@ -182,7 +182,7 @@ def flight(log: Log, reference: str = "auto", axes: Array | None = None) -> Flig
         raise InputError(
             f"{log.path}: {np.count_nonzero(good)} of {len(good)} flow readings are usable (in flight, quality above "
             f"0, a range near that can be believed, not exactly zero); at least {LEAST_FLOW} are needed"
-            + "".join(f"; {line}" for line in untrue_said)
+            + "".join(f"; {line}" for line in untrue_notes)
         )
     if not np.all(np.ptp(velocity[good], axis=0) > 0.0):
         raise InputError(f"{log.path}: the flow is constant; a flight that moves is needed")
@@ -190,7 +190,7 @@ def flight(log: Log, reference: str = "auto", axes: Array | None = None) -> Flig
         str(log.path), t_s, velocity, age_s, quality, range_m, good, log.streams[Sensor.ATTITUDE],
         log.streams.get(Sensor.IMU), chosen, reference_t_s, reference_m, _velocity(log) if chosen == "gps" else None,
         float(np.quantile(np.abs(rate[good]), 0.999)),
-        tuple(note for note in (*prepared.notes, found, *untrue_said) if note), name,
+        tuple(note for note in (*prepared.notes, found, *untrue_notes) if note), name,
         ranges.jumping, ranges.doubt, bool(found),
     )  # fmt: skip
 
@@ -211,9 +211,9 @@ def _ranges(log: Log) -> tuple[Ranges, tuple[str, ...]]:
             "is needed for the flow's scale and height"
         )
     try:
-        return believed(str(log.path), distance, flying & ~wrong.flags), wrong.said
+        return believed(str(log.path), distance, flying & ~wrong.flags), wrong.notes
     except InputError as error:
-        raise InputError("; ".join([str(error), *wrong.said])) from None
+        raise InputError("; ".join([str(error), *wrong.notes])) from None
 
 
 def _velocity_and_rate(sensor: Sensor, value: Array, range_m: Array) -> tuple[Array, Array]:

@@ -93,7 +93,9 @@ def identify_flight(
         responses.append(Response("xy"[axis], runs[0].height_m, _doubted(scale, flown, axis), lag, choice, 1, held_out))
     delay_s = float(np.mean([response.latency_s.value for response in responses]))
     law = against_speed(flown, moved, put_right, delay_s)
-    told = [f"scale: {law.verdict}; the gains are of all speeds together"] if law is not None and law.matters else []
+    of_scale = (
+        [f"scale: {law.verdict}; the gains are of all speeds together"] if law is not None and law.matters else []
+    )
     ranges = flown.range_m[flown.good]
     return Findings(
         "flight",
@@ -106,7 +108,7 @@ def identify_flight(
         flown.flow_limit_rad_s,
         int(flown.quality[flown.good].min()),
         tuple((path if path.is_dir() else path.parent) / name for name in log.inputs),
-        (*flown.notes, *_notes(flown, moved, scale, axes), *told),
+        (*flown.notes, *_notes(flown, moved, scale, axes), *of_scale),
         _details(flown, moved, scale, axes, raw, track),
         law,
         offset,

@@ -36,7 +36,7 @@ class OwnGyro(NamedTuple):
     turn_rad: float
 
     @property
-    def told(self) -> bool:
+    def is_known(self) -> bool:
         """Whether the two turned together so that the slope is known."""
         return self.likeness >= LEAST_LIKENESS and abs(self.turn_rad) < TURNED_RAD
 
@@ -44,7 +44,7 @@ class OwnGyro(NamedTuple):
     def is_off(self) -> bool:
         """Whether the whole interval lies beyond what counts as alike."""
         low, high = ALIKE_WITHIN
-        return self.told and (self.slope.high < low or self.slope.low > high)
+        return self.is_known and (self.slope.high < low or self.slope.low > high)
 
     def sentence(self, gain: float | None) -> str:
         """Verdict in words; "" where nothing is wrong. gain: the flow's own over the true one, None where unknown."""

@@ -34,7 +34,7 @@ class Untrue(NamedTuple):
     """The ranges (n,) that are not the height, and what is wrong with them in words, one line each."""
 
     flags: Flags
-    said: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
 def untrue(log: Log, flying: Flags) -> Untrue:
@@ -42,7 +42,7 @@ def untrue(log: Log, flying: Flags) -> Untrue:
     stream = log.streams[Sensor.RANGE]
     t_s, range_m = stream.t_s - stream.delay_s, stream.value[:, 0]
     rows = np.flatnonzero(flying & (range_m > 0.0) & (stream.quality > 0.0))
-    flags, said = np.zeros(len(t_s), bool), []
+    flags, notes = np.zeros(len(t_s), bool), []
     if len(rows) < LEAST_ROWS:
         return Untrue(flags, ())
     found = [_repeated(t_s[rows], range_m[rows], _height(log))]
@@ -52,8 +52,8 @@ def untrue(log: Log, flying: Flags) -> Untrue:
         away = _away(log, t_s[left], range_m[left])
         flags[left[away.flags]] = True
         found.append(away)
-    said = [line for one in found for line in one.said]
-    return Untrue(flags, tuple(said))
+    notes = [line for one in found for line in one.notes]
+    return Untrue(flags, tuple(notes))
 
 
 def _repeated(t_s: Array, range_m: Array, witness: Witness | None = None) -> Untrue:
@@ -117,9 +117,9 @@ def _away(log: Log, t_s: Array, range_m: Array) -> Untrue:
         flags[a:b] = True
     ratio = float(np.median(range_m[flags] * upright[flags] / expected[flags]))
     seconds = sum(float(t_s[b - 1] - t_s[a]) for a, b in long)
-    said = f"the range stopped being true at {t_s[long[0][0]]:.1f} s: it reads {ratio:.2f} of the height of {name}"
+    note = f"the range stopped being true at {t_s[long[0][0]]:.1f} s: it reads {ratio:.2f} of the height of {name}"
     used = flags if kind == "truth" else np.zeros(len(t_s), bool)
-    return Untrue(used, (f"{said} for {seconds:.0f} s, or the ground is another there",))
+    return Untrue(used, (f"{note} for {seconds:.0f} s, or the ground is another there",))
 
 
 def _height(log: Log) -> Witness | None:

@@ -25,7 +25,7 @@ class Mended(NamedTuple):
     """The flight with what can be used of its reference, and what is wrong with the rest, one line each."""
 
     flown: Flight
-    said: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
 def without_leaps_and_stands(flown: Flight) -> Mended:
@@ -33,12 +33,12 @@ def without_leaps_and_stands(flown: Flight) -> Mended:
     t_s, place = flown.reference_t_s, flown.reference_m
     if flown.reference == "imu" or len(t_s) < LEAST_BLOCKS:
         return Mended(flown, ())
-    good, said, ends = flown.good.copy(), [], []
+    good, notes, ends = flown.good.copy(), [], []
     for begin, end in _stands(t_s, place):
         inside = (flown.t_s > begin) & (flown.t_s < end) & flown.good
         if inside.sum() > 1 and float(np.median(np.hypot(*flown.velocity_m_s[inside].T))) > MOVING_M_S:
             good &= ~((flown.t_s > begin - BESIDE_S) & (flown.t_s < end + BESIDE_S))
-            said.append(f"{flown.reference_name} stands still from {begin:.1f} to {end:.1f} s while the flow moves")
+            notes.append(f"{flown.reference_name} stands still from {begin:.1f} to {end:.1f} s while the flow moves")
             ends.append(end)
     step = np.diff(place, axis=0)
     long = np.linalg.norm(step, axis=1)  # of a noisy reference every step is
@@ -47,11 +47,11 @@ def without_leaps_and_stands(flown: Flight) -> Mended:
         place = np.concatenate([place[: row + 1], place[row + 1 :] - step[row]])
         if not any(abs(t_s[row + 1] - end) < BESIDE_S for end in ends):
             size = float(np.linalg.norm(step[row]))
-            said.append(f"{flown.reference_name} leaps by {size:.1f} m at {t_s[row + 1]:.1f} s")
+            notes.append(f"{flown.reference_name} leaps by {size:.1f} m at {t_s[row + 1]:.1f} s")
             good &= np.abs(flown.t_s - t_s[row]) > 0.5 * BESIDE_S
-    if not said or np.count_nonzero(good) < LEAST_FLOW:
+    if not notes or np.count_nonzero(good) < LEAST_FLOW:
         return Mended(flown, ())
-    return Mended(replace(flown, good=good, reference_m=place), tuple(said))
+    return Mended(replace(flown, good=good, reference_m=place), tuple(notes))
 
 
 def _stands(t_s: Array, place: Array) -> list[tuple[float, float]]:

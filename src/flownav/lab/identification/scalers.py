@@ -119,14 +119,14 @@ def _doubts(findings: Findings, axis: str) -> Iterator[str]:
         return
     if findings.no_scaler_mends:
         yield findings.no_scaler_mends
-    told, known = f"gain of velocity {axis} {shown(response.gain, 1.0, '')}", response.validation_percent
+    shown_gain, known = f"gain of velocity {axis} {shown(response.gain, 1.0, '')}", response.validation_percent
     unseen = [value for value in known if math.isfinite(value)]
     if response.choice.excitation.identifiable < 1:
-        yield f"{told}: {response.choice.excitation.verdict}"
+        yield f"{shown_gain}: {response.choice.excitation.verdict}"
     elif unseen and sum(unseen) / len(unseen) < LEAST_UNSEEN_PERCENT:
         share = sum(unseen) / len(unseen)
         needed = f"{LEAST_UNSEEN_PERCENT:g} % are needed"
-        yield f"{told}: its model fits {share:.1f} % of what it was not fitted to, {needed}"
+        yield f"{shown_gain}: its model fits {share:.1f} % of what it was not fitted to, {needed}"
 
 
 def _response_along(findings: Findings, axis: str) -> Response | None:

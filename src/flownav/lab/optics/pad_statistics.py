@@ -277,8 +277,8 @@ def cells_of(frames: Sequence[TrialFrame], c: dict[str, Array], left: Array) -> 
             own = (c["height_m"] == height_m) & (c["speed_m_s"] == speed_m_s)
             seen = own & (c["whole"] > 0.0)
             rest = left[own][np.isfinite(left[own]).all(1)]
-            told = len(rest) >= LEAST_FRAMES
-            angle, distance, heading = (_rms(rest[:, k]) if told else np.nan for k in (slice(0, 2), 2, 3))
+            enough = len(rest) >= LEAST_FRAMES
+            angle, distance, heading = (_rms(rest[:, k]) if enough else np.nan for k in (slice(0, 2), 2, 3))
             reasons = Counter(f.reason for f, k in zip(frames, own, strict=True) if k and not f.found)
             cells.append(
                 Cell(

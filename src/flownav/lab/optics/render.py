@@ -167,8 +167,8 @@ class Chip(NamedTuple):
 
 def interpolating(kind: type[Pose]) -> Callable[[Pose, Pose, float], Pose]:
     """An equation: the pose this part of the way from a to b, of two so near that rotations may be interpolated."""
-    told = ", ".join(f"a.{name} + part * (b.{name} - a.{name})" for name in kind._fields)
-    return equation(write_function("between", f"def between(a, b, part):\n    return Pose({told})\n", {"Pose": kind}))
+    fields = ", ".join(f"a.{name} + part * (b.{name} - a.{name})" for name in kind._fields)
+    return equation(write_function("between", f"def between(a, b, part):\n    return Pose({fields})\n", {"Pose": kind}))
 
 
 between = interpolating(Pose)

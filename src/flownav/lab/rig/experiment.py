@@ -237,8 +237,8 @@ def _set_up(log: RigLog, command: str, digest: str, *, dated: bool) -> str:
     entries |= {name: getattr(s, name) for name in ("pad", "firmware", "excitation", "seed", "chain_delay_s")}
     origin: dict[str, Any] = {"source": "flownav rig, simulated from pixels", "command": command, "run": log.run}
     origin |= {"light": s.light, "axis_along_swing": s.along}
-    told = ("start_angle_rad", "duration_s", "refocus", "gyro_late_s", "sonar_late_s")
-    origin |= {name: getattr(s, name) for name in told} | {"flownav": made["flownav"]}
+    names = ("start_angle_rad", "duration_s", "refocus", "gyro_late_s", "sonar_late_s")
+    origin |= {name: getattr(s, name) for name in names} | {"flownav": made["flownav"]}
     origin |= {"rig_csv_sha256": digest} | ({"written_utc": made["written_utc"]} if dated else {})
     return to_toml(_rounded(entries) | {"provenance": _rounded(origin)})
 

@@ -33,8 +33,8 @@ class Readiness(NamedTuple):
 
 def has_no_gps(make: str, values: dict[str, Value]) -> bool:
     """Whether the vehicle's parameters state that it has no receiver."""
-    told = [values[name].number for name in RECEIVERS.get(make, ()) if name in values]
-    return any(number == 0.0 for number in told)
+    receivers = [values[name].number for name in RECEIVERS.get(make, ()) if name in values]
+    return any(number == 0.0 for number in receivers)
 
 
 def origin_of(text: str) -> Place:
@@ -48,7 +48,7 @@ def origin_of(text: str) -> Place:
     return latitude, longitude, altitude_m
 
 
-def told_origin(talk: Talk, tries: int = TRIES) -> Place | None:
+def origin_of_vehicle(talk: Talk, tries: int = TRIES) -> Place | None:
     """Where the autopilot's frame begins, asked for; None where it has no origin."""
     assert talk.vehicle is not None
     for _ in range(tries):
@@ -69,7 +69,7 @@ def set_origin(talk: Talk, place: Place) -> Place | None:
     numbers = round(latitude * 1e7), round(longitude * 1e7), round(altitude_m * 1e3)
     for _ in range(TRIES):
         talk.say(talk.mav.set_gps_global_origin_encode(talk.vehicle.system, *numbers))
-        found = told_origin(talk, 1)
+        found = origin_of_vehicle(talk, 1)
         if found is not None:
             return found
     return None
@@ -81,16 +81,16 @@ def readiness(talk: Talk, make: str, values: dict[str, Value], origin: Place | N
     assert talk.vehicle is not None
     place = set_origin(talk, origin) if origin is not None and talk.armed is False else None
     if without and place is None:
-        place = told_origin(talk)
+        place = origin_of_vehicle(talk)
     missing = []
     if origin is not None and place is None:
         missing.append("the origin was not set: the vehicle is armed, or does not take SET_GPS_GLOBAL_ORIGIN")
     elif without and place is None and talk.vehicle.make == ARDUPILOT:
         missing.append(NEEDS_ORIGIN)
-    return Readiness(without, place, tuple(missing), tuple(said_of_arming(talk)))
+    return Readiness(without, place, tuple(missing), tuple(arming_messages(talk)))
 
 
-def said_of_arming(talk: Talk) -> list[str]:
+def arming_messages(talk: Talk) -> list[str]:
     """The autopilot's messages about arming when it is asked to run its checks, each once; none where it is armed."""
     assert talk.vehicle is not None
     if talk.armed is not False:

@@ -176,10 +176,10 @@ def _write(talk: Talk, report: Report, values: dict[str, Value]) -> None:
 
 def _nobody(talk: Talk, meet_s: float) -> str:
     counts = talk.reception.counts
-    heard = ", ".join(f"{name} {count}" for name, count in sorted(counts.items()))
-    if heard:
+    counted = ", ".join(f"{name} {count}" for name, count in sorted(counts.items()))
+    if counted:
         return (
-            f"no autopilot's HEARTBEAT in {meet_s:.0f} s, though something is received ({heard}): "
+            f"no autopilot's HEARTBEAT in {meet_s:.0f} s, though something is received ({counted}): "
             "see --system, --component, --signing-key and the baud rate"
         )
     return f"nothing was received in {meet_s:.0f} s: check cable, port and baud rate, and where the vehicle sends to"

@@ -177,8 +177,10 @@ def _fault(row: Wanted) -> str:
 
 
 def _words(row: Wanted) -> str:
-    said = " ".join(part for part in (row.words(), row.unit) if part)
-    return f"{said} ({row.meaning})" if row.meaning and said else said or row.meaning or row.unit
+    words_of_row = " ".join(part for part in (row.words(), row.unit) if part)
+    return (
+        f"{words_of_row} ({row.meaning})" if row.meaning and words_of_row else words_of_row or row.meaning or row.unit
+    )
 
 
 def blocks_of(known: Knowledge, values: dict[str, Value]) -> list[Block]:

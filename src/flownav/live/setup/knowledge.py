@@ -34,17 +34,17 @@ class Rule(ParameterModel):
 
     def words(self) -> str:
         """The wanted value in a few words; "" where any value fits."""
-        said = [" or ".join(f"{wanted:g}" for wanted in self.one_of)] if self.one_of else []
-        said += [f"not {' nor '.join(f'{refused:g}' for refused in self.exclude)}"] if self.exclude else []
+        terms = [" or ".join(f"{wanted:g}" for wanted in self.one_of)] if self.one_of else []
+        terms += [f"not {' nor '.join(f'{refused:g}' for refused in self.exclude)}"] if self.exclude else []
         if self.at_least is not None and self.at_most is not None:
-            said.append(f"{self.at_least:g} to {self.at_most:g}")
+            terms.append(f"{self.at_least:g} to {self.at_most:g}")
         else:
-            said += [f"at least {self.at_least:g}"] if self.at_least is not None else []
-            said += [f"at most {self.at_most:g}"] if self.at_most is not None else []
+            terms += [f"at least {self.at_least:g}"] if self.at_least is not None else []
+            terms += [f"at most {self.at_most:g}"] if self.at_most is not None else []
         for mask, state in ((self.bits_set, "set"), (self.bits_clear, "clear")):
             bits = [str(bit) for bit in range(mask.bit_length()) if mask >> bit & 1]
-            said += [f"bit{'s' if len(bits) > 1 else ''} {' and '.join(bits)} {state}"] if bits else []
-        return ", ".join(said)
+            terms += [f"bit{'s' if len(bits) > 1 else ''} {' and '.join(bits)} {state}"] if bits else []
+        return ", ".join(terms)
 
 
 class Wanted(Rule):

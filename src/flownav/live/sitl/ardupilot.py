@@ -95,8 +95,8 @@ class ArduPilot(Pilot):
                 break
             except NotFlown:
                 if time.monotonic() > end_s:
-                    said = [what for _, who, what in self.wire.history.words if who == "autopilot"][-3:]
-                    raise NotFlown("guided mode is refused: " + "; ".join(dict.fromkeys(said))) from None
+                    reasons = [what for _, who, what in self.wire.history.words if who == "autopilot"][-3:]
+                    raise NotFlown("guided mode is refused: " + "; ".join(dict.fromkeys(reasons))) from None
         heli = self.case.vehicle == "heli"
         self._channels(1000, 1000)
         self.arm()

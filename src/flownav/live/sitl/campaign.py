@@ -39,11 +39,11 @@ def program_of(autopilot: str, vehicle: str, given: Path | None) -> Path:
         if not given.is_file() or not os.access(given, os.X_OK):
             raise InputError(f"{arg('binary')} {given}: no program is there; {get}, and give its {name}")
         return given
-    if told := os.environ.get(variable):
-        for each in (Path(told), Path(told) / name, Path(told).parent / name):
+    if root := os.environ.get(variable):
+        for each in (Path(root), Path(root) / name, Path(root).parent / name):
             if each.is_file() and each.name == name and os.access(each, os.X_OK):
                 return each.absolute()
-        raise InputError(f"{variable} {told}: no {name} is there; {get}, and name its program or folder")
+        raise InputError(f"{variable} {root}: no {name} is there; {get}, and name its program or folder")
     if found := shutil.which(name):
         return Path(found)
     raise InputError(f"{name} is not found: {get}, then give {arg('binary')}, {variable} or the PATH")
@@ -149,7 +149,7 @@ def _one(task: Task) -> dict[str, Any]:
     (place / "words.txt").write_text("".join(words))
     np.savez_compressed(
         place / "flight.npz",
-        told=np.array([(t.now_s, t.boot_s, *t.pos_ned_m, t.quality, t.resets) for t in result.history.told]),
+        told=np.array([(t.now_s, t.boot_s, *t.pos_ned_m, t.quality, t.resets) for t in result.history.estimates]),
         truth=np.array(
             [
                 (t.now_s, *t.state.position_deg_m, *t.state.vel_ned_m_s, *t.state.quaternion)

@@ -74,11 +74,11 @@ class FlowSensor:
         gyro = [rate + self._chance.gauss(0.0, GYRO_NOISE_RAD_S) for rate in rates[2:]]
         gyro[0] += self.state.gyro_rad_s
         reading = Measurement(truth.now_s, Sensor.FLOW_RATE, (*flow, *gyro[:2]), (0.0,) * 4, 0.0, QUALITY)
-        told = say.optical_flow_rad(self._mav, round(truth.now_s * 1e6), reading, interval_s)
-        told.integrated_zgyro = gyro[2] * interval_s  # of fewer axes, PX4 would put its own gyro in their place
-        self._stuck = (self._stuck or told) if self.state.flow_stuck else None
+        message = say.optical_flow_rad(self._mav, round(truth.now_s * 1e6), reading, interval_s)
+        message.integrated_zgyro = gyro[2] * interval_s  # of fewer axes, PX4 would put its own gyro in their place
+        self._stuck = (self._stuck or message) if self.state.flow_stuck else None
         if self.state.flow:
-            self._waiting.append((truth.now_s + DELAY_S + self.state.flow_late_s, self._stuck or told))
+            self._waiting.append((truth.now_s + DELAY_S + self.state.flow_late_s, self._stuck or message))
 
 
 class Receiver:
@@ -87,18 +87,18 @@ class Receiver:
     def __init__(self, wire: Wire, system: int) -> None:
         self.state = Eyes()
         self._wire, self._mav = wire, coder(system, COMPONENT)
-        self._said_s = float("-inf")
+        self._sent_s = float("-inf")
         wire.turns.append(self.turn)
 
     def turn(self, now_s: float) -> None:
         """Send a fix where one is due."""
         off_m = self.state.gps_north_m
-        if off_m is None or now_s - self._said_s < FIX_S or not self._wire.history.truth:
+        if off_m is None or now_s - self._sent_s < FIX_S or not self._wire.history.truth:
             return
-        self._said_s = now_s
-        told = self._wire.history.truth[-1]
-        fix = pymap3d.ned2geodetic(off_m, 0.0, 0.0, *told.state.position_deg_m)
-        self._wire.say(say.hil_gps(self._mav, round(told.now_s * 1e6), fix, told.state.vel_ned_m_s), self._mav)
+        self._sent_s = now_s
+        latest = self._wire.history.truth[-1]
+        fix = pymap3d.ned2geodetic(off_m, 0.0, 0.0, *latest.state.position_deg_m)
+        self._wire.say(say.hil_gps(self._mav, round(latest.now_s * 1e6), fix, latest.state.vel_ned_m_s), self._mav)
 
 
 def seen(state: TrueState, ground_m: float) -> tuple[float, ...]:

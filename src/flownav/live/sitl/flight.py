@@ -137,15 +137,15 @@ class Live:
         self._running.returncode = os.waitstatus_to_exitcode(status)
         lasted_s = time.monotonic() - self._began_s
         self._words.seek(0)
-        said = self._words.read().decode(errors="replace").splitlines()
+        lines = self._words.read().decode(errors="replace").splitlines()
         self._words.close()
         facts: dict[str, Any] = {}
-        for line in said:
+        for line in lines:
             if line.startswith("{"):
                 facts = json.loads(line)
         return facts | {
             "cpu_s": usage.ru_utime + usage.ru_stime, "ran_s": lasted_s, "status": self._running.returncode,
-            "words": [line for line in said if not line.startswith("{")],
+            "words": [line for line in lines if not line.startswith("{")],
         }  # fmt: skip
 
 
@@ -246,9 +246,13 @@ class _Flight:
     def ask_origin(self) -> None:
         """Where the autopilot's frame begins, about which flownav sends."""
         self.pilot.command(REQUEST, ORIGIN)
-        told = self.wire.latest.get("GPS_GLOBAL_ORIGIN")
-        if told is not None:
-            self.origin = told.latitude * 1e-7, told.longitude * 1e-7, told.altitude * 1e-3
+        origin_message = self.wire.latest.get("GPS_GLOBAL_ORIGIN")
+        if origin_message is not None:
+            self.origin = (
+                origin_message.latitude * 1e-7,
+                origin_message.longitude * 1e-7,
+                origin_message.altitude * 1e-3,
+            )
 
     # -- faults ------------------------------------------------------------------------------------------------
     def strike(self, now_s: float) -> None:

@@ -24,15 +24,15 @@ class PadCamera:
         self._wire, self._mav = wire, coder(system, COMPONENT)
         self._chance = random.Random(seed)
         self._pad: tuple[float, float, float] | None = None
-        self._told_s = float("-inf")
+        self._sent_s = float("-inf")
         wire.turns.append(self.turn)
 
     def turn(self, now_s: float) -> None:
         """Send the pad where a picture is due and shows it."""
         truth = self._wire.history.truth
-        if not truth or now_s - self._told_s < EVERY_S:
+        if not truth or now_s - self._sent_s < EVERY_S:
             return
-        self._told_s, state = now_s, truth[-1].state
+        self._sent_s, state = now_s, truth[-1].state
         self._pad = self._pad or state.position_deg_m
         sight = sighted(state, self._pad)
         if sight is None:

@@ -66,7 +66,7 @@ class Pilot(ABC):
         self.binary, self.folder = binary.absolute(), folder.absolute()  # the simulator runs in its own folder
         self.slot, self.case = slot, case
         self.wire = self.connected()
-        self.wire.heard.append(self._heard)
+        self.wire.received.append(self._received)
         self.wire.beats.append(self._beat)
         self.program: Program | None = None
         self.target: tuple[float, float, float] | None = None
@@ -149,7 +149,7 @@ class Pilot(ABC):
         """Into the flight's words."""
         self.wire.history.say("pilot", " ".join(map(str, words)))
 
-    def _heard(self, message: Message) -> None:
+    def _received(self, message: Message) -> None:
         if message.msgname == "COMMAND_ACK":
             self._acks[message.command] = message.result
         elif message.msgname == "PARAM_VALUE":
@@ -190,8 +190,8 @@ class Pilot(ABC):
             self.wire.say(set_value(self.wire.mav, self.system, 1, name, Value(number, known.kind), make))
             if self.wire.until(lambda: name in self._values, 0.7):
                 break
-        told = self._values.get(name)
-        if told is None or not math.isclose(told.number, number, rel_tol=1e-3, abs_tol=1e-6):
+        has = self._values.get(name)
+        if has is None or not math.isclose(has.number, number, rel_tol=1e-3, abs_tol=1e-6):
             raise NotFlown(f"{name} does not become {number:g}")
 
     def streams(self, rates_hz: dict[int, float]) -> None:
@@ -206,8 +206,8 @@ class Pilot(ABC):
             if self.command(ARM, 1.0) == 0 and self.wire.until(lambda: self.wire.armed, 3.0):
                 return
             self.wire.pump(1.0)
-        said = [what for _, who, what in self.wire.history.words if who == "autopilot"][-3:]
-        raise NotFlown("never armed: " + "; ".join(dict.fromkeys(said)))
+        reasons = [what for _, who, what in self.wire.history.words if who == "autopilot"][-3:]
+        raise NotFlown("never armed: " + "; ".join(dict.fromkeys(reasons)))
 
     @property
     def local_ned_m(self) -> tuple[float, float, float]:

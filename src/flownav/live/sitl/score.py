@@ -27,16 +27,16 @@ def figures(flown: Flown) -> dict[str, Any]:
     believed in, in the hover. touchdown_m: from the place of take-off. strayed_m: farthest from the path that was
     commanded. silent_s: the longest gap in sending.
     """
-    said: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "autopilot": flown.order.autopilot, "scenario": flown.order.scenario, **flown.order.case._asdict(),
         "faults": [struck._asdict() for struck in flown.order.struck], "landed": False, "why": flown.why,
     }  # fmt: skip
     truth = _truth(flown)
     hover_s, land_s, end_s = (_mark(flown, name) for name in ("hover", "land", "end"))
     last_s = truth[-1, 0] if len(truth) else NAN
-    said |= _of_live(flown)
+    facts |= _of_live(flown)
     if hover_s != hover_s or len(truth) < 2:
-        return said
+        return facts
     until_s = next(
         (mark.now_s for mark in flown.marks if mark.now_s > hover_s and mark.name in ("square", "land")), last_s
     )
@@ -46,7 +46,7 @@ def figures(flown: Flown) -> dict[str, Any]:
     at_end = truth[-1]
     landed = flown.landed and -at_end[3] < HIGH_M and at_end[4] > TILTED
     flew = truth[(truth[:, 0] >= hover_s)]
-    said |= {
+    facts |= {
         "landed": bool(landed),
         "hover_rms_m": _rms(off_m),
         "strayed_m": _strayed_m(flew[:, 1:3], flown.path_ne_m, begin[:2]),
@@ -54,15 +54,15 @@ def figures(flown: Flown) -> dict[str, Any]:
         "touchdown_m": float(np.hypot(*at_end[1:3])) if landed else None,
         "flew_s": (land_s if land_s == land_s else last_s) - hover_s,
     }
-    said |= _of_autopilot(flown, truth, hover_s, until_s)
-    return said | _of_estimate(flown, truth, hover_s, until_s, end_s if end_s == end_s else last_s)
+    facts |= _of_autopilot(flown, truth, hover_s, until_s)
+    return facts | _of_estimate(flown, truth, hover_s, until_s, end_s if end_s == end_s else last_s)
 
 
 def _of_estimate(flown: Flown, truth: Array, hover_s: float, until_s: float, end_s: float) -> dict[str, Any]:
     """Figures of what was sent, from the hover on."""
-    told = np.array([(t.now_s, *t.pos_ned_m, t.quality, t.resets) for t in flown.history.told]).reshape(-1, 6)
-    told = told[(told[:, 0] >= hover_s) & (told[:, 0] <= end_s)]
-    placed = told[np.isfinite(told[:, 1])]
+    sent = np.array([(t.now_s, *t.pos_ned_m, t.quality, t.resets) for t in flown.history.estimates]).reshape(-1, 6)
+    sent = sent[(sent[:, 0] >= hover_s) & (sent[:, 0] <= end_s)]
+    placed = sent[np.isfinite(sent[:, 1])]
     if len(placed) < 2:
         return {"sent": len(placed), "silent_s": end_s - hover_s}
     error = placed[:, 1:4] - _at(truth, placed[:, 0]) - _frame(flown)
@@ -77,7 +77,7 @@ def _of_estimate(flown: Flown, truth: Array, hover_s: float, until_s: float, end
     gaps = np.diff(np.concatenate([[hover_s], placed[:, 0], [end_s]]))
     return {
         "sent": len(placed),
-        "velocity_only": int(len(told) - len(placed)),
+        "velocity_only": int(len(sent) - len(placed)),
         "error_rms_m": _rms(np.hypot(held[:, 0], held[:, 1])),
         "error_m": float(level_m.max()),
         "error_down_m": float(down_m.max()),
@@ -113,10 +113,10 @@ def _of_live(flown: Flown) -> dict[str, Any]:
 
 def _truth(flown: Flown) -> Array:
     """Rows of our clock [s], north, east, down about the first place [m], and the cosine of the tilt."""
-    told = flown.history.truth
-    if not told:
+    truths = flown.history.truth
+    if not truths:
         return np.zeros((0, 5))
-    home = told[0].state.position_deg_m
+    home = truths[0].state.position_deg_m
     return np.array(
         [
             (
@@ -124,7 +124,7 @@ def _truth(flown: Flown) -> Array:
                 *_local(truth.state.position_deg_m, home),
                 rotation_from_quaternion(*truth.state.quaternion)[8],
             )
-            for truth in told
+            for truth in truths
         ]
     )
 

@@ -29,7 +29,7 @@ STAMPED = 35  # SO_TIMESTAMPNS of Linux: the kernel's time of a datagram's arriv
 NAN = float("nan")
 
 
-class Told(NamedTuple):
+class SentEstimate(NamedTuple):
     """An estimate as it left flownav: our clock, the vehicle's [s], place and velocity (NaN where it is left out)."""
 
     now_s: float
@@ -51,7 +51,7 @@ class History:
 
     def __init__(self) -> None:
         self.truth: list[Truth] = []
-        self.told: list[Told] = []
+        self.estimates: list[SentEstimate] = []
         self.local: list[tuple[float, LocalState]] = []
         self.words: list[tuple[float, str, str]] = []  # when, who, what
         self.boot_less_now_s = -math.inf  # the vehicle's time since boot less our clock, by the shortest wait
@@ -88,7 +88,7 @@ class Wire:
         self._vehicle_peer: Any = None
         self._frames, self._coder, self._mav = StreamFrames(), coder(), coder(*STATION)
         self.latest: dict[str, Message] = {}
-        self.heard: list[Callable[[Message], None]] = []  # called with each message of the autopilot
+        self.received: list[Callable[[Message], None]] = []  # called with each message of the autopilot
         self.beats: list[Callable[[Any], list[Message]]] = []  # messages that are sent ten times a second
         self.turns: list[Callable[[float], None]] = []  # what is done each turn of the loop
         self.kept: Callable[[bytes, bool], None] | None = (
@@ -142,10 +142,10 @@ class Wire:
         ready, _, _ = select.select([self._station, self._vehicle, self._live], [], [], wait_s)
         now_s = time.monotonic()
         for each in ready:
-            for piece, sender, came_s in _read(each, now_s):
+            for piece, sender, arrived_s in _read(each, now_s):
                 if each is self._station:
                     self._station_peer = self._station_peer or sender
-                    self._hear(piece, came_s)
+                    self._receive(piece, arrived_s)
                 elif each is self._vehicle:
                     self._vehicle_peer = sender
                     self._pass(piece, self._live, (HOST, self.live_port))
@@ -166,7 +166,7 @@ class Wire:
                 self.say(message)
 
     # -- reception -----------------------------------------------------------------------------------------------
-    def _hear(self, piece: bytes, now_s: float) -> None:
+    def _receive(self, piece: bytes, now_s: float) -> None:
         for frame, content in self._frames.feed(piece, whole=True):
             if frame.component != 1:
                 continue
@@ -185,7 +185,7 @@ class Wire:
             self.history.local.append((now_s, state))
         elif name == "STATUSTEXT":
             self.history.words.append((now_s, "autopilot", message.text.rstrip("\0")))
-        for who in self.heard:
+        for who in self.received:
             who(message)
 
     def _pass(self, piece: bytes, out: socket.socket, to: Any, now_s: float = NAN) -> None:
@@ -210,7 +210,9 @@ class Wire:
         message = self._coder.decode(bytearray(frame))
         boot_s = getattr(message, "time_usec", getattr(message, "usec", 0)) * 1e-6
         place = (NAN,) * 3 if number == SPEED else (message.x, message.y, message.z)
-        self.history.told.append(Told(now_s, boot_s, place, getattr(message, "quality", 0), message.reset_counter))
+        self.history.estimates.append(
+            SentEstimate(now_s, boot_s, place, getattr(message, "quality", 0), message.reset_counter)
+        )
 
     # -- what is known ------------------------------------------------------------------------------------------
     @property
@@ -228,8 +230,12 @@ class Wire:
     @property
     def sends(self) -> bool:
         """Whether flownav has sent a place in the last second."""
-        told = self.history.told
-        return bool(told) and time.monotonic() - told[-1].now_s < 1.0 and math.isfinite(told[-1].pos_ned_m[0])
+        estimates = self.history.estimates
+        return (
+            bool(estimates)
+            and time.monotonic() - estimates[-1].now_s < 1.0
+            and math.isfinite(estimates[-1].pos_ned_m[0])
+        )
 
 
 def bound(port: int = 0) -> socket.socket:
@@ -264,11 +270,11 @@ def _read(from_where: socket.socket, now_s: float) -> Iterator[tuple[bytes, Any,
         except OSError:  # the other end is gone
             return
         stamps = [content for level, kind, content in beside if level == socket.SOL_SOCKET and kind == STAMPED]
-        came_s = now_s
+        arrived_s = now_s
         if stamps and len(stamps[0]) == 16:
             seconds, nanoseconds = struct.unpack("@qq", stamps[0])
-            came_s = min(now_s, seconds + 1e-9 * nanoseconds - unix_less_now_s)
-        yield piece, sender, came_s
+            arrived_s = min(now_s, seconds + 1e-9 * nanoseconds - unix_less_now_s)
+        yield piece, sender, arrived_s
 
 
 def _whole(piece: bytes) -> Iterator[bytes]:

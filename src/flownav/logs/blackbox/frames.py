@@ -267,10 +267,10 @@ def decode(
             sound = sound or kind == FRAME_I
             put_behind(m, kind == FRAME_I)
             if places.time >= 0 and sound:
-                told = m.now[places.time] & 0xFFFFFFFF
-                if told < (clock & 0xFFFFFFFF) - 0x80000000:
+                low_bits = m.now[places.time] & 0xFFFFFFFF
+                if low_bits < (clock & 0xFFFFFFFF) - 0x80000000:
                     high += 1 << 32
-                clock = told
+                clock = low_bits
                 for k in range(len(taken)):
                     kept.main[rows, k] = m.now[taken[k]]
                 kept.clocks[rows] = clock + high

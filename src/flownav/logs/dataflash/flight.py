@@ -16,7 +16,7 @@ from flownav.logs.assembly import Origin, local_ned
 from flownav.logs.csv_table import CsvTable
 from flownav.logs.dataflash import sensors
 from flownav.logs.dataflash.columns import DataFlash, Field, check_rows, good_rows, held_at, message_rows
-from flownav.logs.dataflash.said import battery, happened, parameters, setpoints
+from flownav.logs.dataflash.events import battery, happened, parameters, setpoints
 from flownav.logs.log import SIMULATOR, Log, absences_of, state_table
 from flownav.logs.plausible import check_plausible
 
@@ -61,10 +61,10 @@ def estimate_rows(log: DataFlash, settings: dict[str, float]) -> tuple[str, CsvT
 
 def _primary(log: DataFlash, name: str, table: CsvTable) -> Array:
     """The core in use at each row's time; the lowest one where the log does not state it."""
-    said = good_rows(log, name, (Field("PI", 0, 8),))
-    if said is None:
+    primary = good_rows(log, name, (Field("PI", 0, 8),))
+    if primary is None:
         return np.full(len(table.t_s), table.columns["C"].min(initial=np.inf))
-    return held_at(table.t_s, said.t_s, said.columns["PI"])
+    return held_at(table.t_s, primary.t_s, primary.columns["PI"])
 
 
 def estimate(table: CsvTable, origins: CsvTable | None, origin: Origin | None) -> Table:
@@ -189,8 +189,8 @@ def _check_needed(log: DataFlash, tables: dict[str, CsvTable], notes: list[str])
     wanted = ["GPS", *sensors.STREAMS]
     if tables.keys() & set(wanted):
         return
-    told = [note for note in notes if note.partition(" ")[0].rstrip(":") in wanted]
-    why = "; ".join(told) or "LOG_BITMASK decides what the vehicle writes"
+    reasons = [note for note in notes if note.partition(" ")[0].rstrip(":") in wanted]
+    why = "; ".join(reasons) or "LOG_BITMASK decides what the vehicle writes"
     raise InputError(f"{log.path}: no usable {', '.join(wanted)} in the log; {why}")
 
 

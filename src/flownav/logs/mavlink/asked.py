@@ -71,8 +71,8 @@ class Asked:
 def place_of(message: Message) -> tuple[float, ...] | None:
     """The position of a POSITION_TARGET_LOCAL_NED, NaN where it is to be ignored; None where nothing is left."""
     place = (float(message.x), float(message.y), float(message.z))
-    told = tuple(
+    components = tuple(
         math.nan if message.type_mask & bit or not abs(x) < FARTHEST_M else x
         for x, bit in zip(place, PLACE_BITS, strict=True)
     )
-    return told if message.coordinate_frame == LOCAL_NED and any(map(math.isfinite, told)) else None
+    return components if message.coordinate_frame == LOCAL_NED and any(map(math.isfinite, components)) else None

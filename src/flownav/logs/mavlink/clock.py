@@ -92,7 +92,7 @@ def align(state: ClockState, arrival_s: float, stamp: Stamp | None) -> tuple[Clo
         if not rules and now != now:
             return state, Aligned(now, "no_clock")
         offset = 0.0 if rules else now - stamp.stamp_s
-        return _heard(state, stamp.clock, _Clock(offset, stamp.stamp_s), arrival_s, rules)
+        return _received(state, stamp.clock, _Clock(offset, stamp.stamp_s), arrival_s, rules)
     turns = _turns(clock, stamp)
     reading = stamp.stamp_s + (clock.wraps + turns) * stamp.wrap_s
     wraps = clock.wraps + max(turns, 0)
@@ -103,7 +103,7 @@ def align(state: ClockState, arrival_s: float, stamp: Stamp | None) -> tuple[Clo
     if not rules:
         laid = _laid(clock, laid, now, reading)
     late = reading < clock.stamp_s
-    state, aligned = _heard(state, stamp.clock, laid, arrival_s, rules and not late, event)
+    state, aligned = _received(state, stamp.clock, laid, arrival_s, rules and not late, event)
     return state, aligned._replace(t_s=reading + laid.offset_s)
 
 
@@ -121,7 +121,7 @@ def _laid(before: _Clock, clock: _Clock, now: float, reading: float) -> _Clock:
     return clock._replace(offset_s=offset + least)
 
 
-def told_unix_time(state: ClockState, clock: ClockName, unix_s: float, boot_s: float) -> ClockState:
+def received_unix_time(state: ClockState, clock: ClockName, unix_s: float, boot_s: float) -> ClockState:
     """SYSTEM_TIME has both times of one instant: the UNIX clock's offset is then known without any wait."""
     reference = state.clocks.get(state.reference)
     if reference is None or unix_s * 1e6 < UNIX_FROM_US:
@@ -159,7 +159,7 @@ def timesync_offset_s(tc1_ns: int, ts1_ns: int, now_ns: int) -> tuple[float, flo
     return (tc1_ns - 0.5 * (ts1_ns + now_ns)) * 1e-9, (now_ns - ts1_ns) * 1e-9
 
 
-def _heard(
+def _received(
     state: ClockState, name: ClockName, clock: _Clock, arrival_s: float, leads: bool, event: str = ""
 ) -> tuple[ClockState, Aligned]:
     t_s = clock.stamp_s + clock.offset_s
@@ -196,7 +196,7 @@ def _doubted(
     agrees = clock.doubts > 0 and abs(offset - clock.doubted_offset_s) < AGREEMENT_S
     doubts = clock.doubts + (stamp.stamp_s > clock.doubted_stamp_s) if agrees else 1
     if doubts >= CONFIRMATIONS:
-        return _heard(state, stamp.clock, _Clock(offset, stamp.stamp_s), arrival_s, rules, "clock_jump")
+        return _received(state, stamp.clock, _Clock(offset, stamp.stamp_s), arrival_s, rules, "clock_jump")
     newest = max(stamp.stamp_s, clock.doubted_stamp_s) if agrees else stamp.stamp_s
     doubted = clock._replace(doubted_offset_s=offset, doubted_stamp_s=newest, doubts=doubts)
     state = state._replace(clocks={**state.clocks, stamp.clock: doubted})

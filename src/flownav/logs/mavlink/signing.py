@@ -31,7 +31,7 @@ NEW_STREAM_TICKS = 60 * TICKS_PER_S  # a stream not received before may be this 
 MOST_KEY_FILE_BYTES = 1024
 READ_BY_OTHERS = stat.S_IRGRP | stat.S_IROTH
 
-_told: set[Path] = set()
+_warned: set[Path] = set()
 
 
 def load_key(path: Path) -> bytes:
@@ -60,8 +60,8 @@ def load_key(path: Path) -> bytes:
 
 def _warn_of_readers(path: Path, mode: int) -> None:
     """Warn of a key that other users can read: it commands the vehicle. Windows does not show this in the mode."""
-    if os.name == "posix" and mode & READ_BY_OTHERS and path not in _told:
-        _told.add(path)
+    if os.name == "posix" and mode & READ_BY_OTHERS and path not in _warned:
+        _warned.add(path)
         print(f"flownav: {path}: other users can read this signing key; chmod 600 keeps it yours", file=sys.stderr)
 
 

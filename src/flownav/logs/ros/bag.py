@@ -37,9 +37,9 @@ class Channel(NamedTuple):
     definition_kind: str
 
 
-def one_line(said: object) -> str:
+def one_line(words: object) -> str:
     """Any text of a library or a bag as one line for a message: names in a bag may hold anything."""
-    return " ".join(str(said).split())
+    return " ".join(str(words).split())
 
 
 def _why(error: BaseException) -> str:

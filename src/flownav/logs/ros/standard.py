@@ -47,23 +47,23 @@ def _imu(roles: dict[str, Gathered], clock: Clock) -> list[Stream | None]:
 
 
 def _simple(roles: dict[str, Gathered], clock: Clock) -> list[Stream | None]:
-    def said(sensor: Sensor, topic: Gathered, value: Array) -> Stream | None:
+    def _stream(sensor: Sensor, topic: Gathered, value: Array) -> Stream | None:
         return sensor_stream(sensor, clock.times(topic), value, delay_s=clock.delay_s(topic))
 
     found: list[Stream | None] = []
     if "baro" in roles:
-        found.append(said(Sensor.BARO, roles["baro"], pressure_altitude_m(roles["baro"].column("pressure")[:, 0])))
+        found.append(_stream(Sensor.BARO, roles["baro"], pressure_altitude_m(roles["baro"].column("pressure")[:, 0])))
     if "mag" in roles:
-        found.append(said(Sensor.MAG, roles["mag"], GAUSS_PER_TESLA * frd(roles["mag"].column("x", "y", "z"))))
+        found.append(_stream(Sensor.MAG, roles["mag"], GAUSS_PER_TESLA * frd(roles["mag"].column("x", "y", "z"))))
     if "range" in roles:
         range_m, low, high = roles["range"].column("range", "min_range", "max_range").T
         range_m = np.where((range_m >= low) & ((range_m <= high) | (high <= low)), range_m, np.nan)
-        found.append(said(Sensor.RANGE, roles["range"], range_m))
+        found.append(_stream(Sensor.RANGE, roles["range"], range_m))
     elif "flow" in roles:
         distance, quality = roles["flow"].column("distance", "quality").T
         distance = np.where((distance > 0.0) & (quality > 0.0), distance, np.nan)
         if np.isfinite(distance).any():
-            found.append(said(Sensor.RANGE, roles["flow"], distance))
+            found.append(_stream(Sensor.RANGE, roles["flow"], distance))
     return found
 
 
@@ -108,14 +108,14 @@ def _gps(roles: dict[str, Gathered], clock: Clock) -> tuple[list[Stream], Origin
 
 def _nearest(topic: Gathered, clock: Clock, t_s: Array) -> Array:
     """The velocity (NED) nearest in time to each fix, NaN where none is within half the usual step."""
-    told_s = clock.times(topic)
-    order = np.argsort(told_s, kind="stable")
-    told_s, velocity = told_s[order], ned(topic.column("vx", "vy", "vz"))[order]
-    after = np.clip(np.searchsorted(told_s, t_s), 1, max(len(told_s) - 1, 1))
-    if len(told_s) < LEAST_ROWS:
+    stated_s = clock.times(topic)
+    order = np.argsort(stated_s, kind="stable")
+    stated_s, velocity = stated_s[order], ned(topic.column("vx", "vy", "vz"))[order]
+    after = np.clip(np.searchsorted(stated_s, t_s), 1, max(len(stated_s) - 1, 1))
+    if len(stated_s) < LEAST_ROWS:
         return np.full((len(t_s), 3), np.nan)
-    row = np.where(t_s - told_s[after - 1] < told_s[after] - t_s, after - 1, after)
-    near = np.abs(told_s[row] - t_s) <= max(0.5 * float(np.median(np.diff(told_s))), 0.02)
+    row = np.where(t_s - stated_s[after - 1] < stated_s[after] - t_s, after - 1, after)
+    near = np.abs(stated_s[row] - t_s) <= max(0.5 * float(np.median(np.diff(stated_s))), 0.02)
     return np.where(near[:, None], velocity[row], np.nan)
 
 
@@ -149,8 +149,8 @@ def battery_table(topic: Gathered, t_s: Array) -> Table | None:
     voltage, current, share = topic.column("voltage", "current", "percentage").T
     kept = (voltage > 0.0) & np.isfinite(t_s)
     order = np.argsort(t_s[kept], kind="stable")
-    told = {"voltage_v": voltage, "current_a": -current, "remaining_percent": 100.0 * share}
-    return {"t_s": t_s[kept][order]} | {name: x[kept][order] for name, x in told.items()} if kept.any() else None
+    columns = {"voltage_v": voltage, "current_a": -current, "remaining_percent": 100.0 * share}
+    return {"t_s": t_s[kept][order]} | {name: x[kept][order] for name, x in columns.items()} if kept.any() else None
 
 
 def path_table(topic: Gathered, t_s: Array) -> Table | None:

@@ -7,7 +7,7 @@ constant. It states no uncertainty and tests no reading.
 import numpy as np
 
 from flownav.core.measurement import Sensor
-from flownav.parts.protocols import Estimate, Imu, Reading, Told
+from flownav.parts.protocols import Estimate, GivenSettings, Imu, Reading
 from flownav.parts.tools import AttitudeFollower, flow_velocity, matrix
 
 # how long the IMU is believed before each sensor has its way [s]
@@ -19,9 +19,9 @@ class ComplementaryFilter:
 
     name = "complementary"
 
-    def start(self, told: Told) -> None:
+    def start(self, given: GivenSettings) -> None:
         """Begin: nothing is known yet."""
-        self.told, self.attitude, self.pos, self.vel = told.settings, AttitudeFollower(), np.zeros(3), np.zeros(3)
+        self.given, self.attitude, self.pos, self.vel = given.settings, AttitudeFollower(), np.zeros(3), np.zeros(3)
         self.t_s, self.range_m, self.ground_d_m = 0.0, np.nan, np.nan
         self.seen_s: dict[Sensor, float] = {}
 
@@ -36,7 +36,7 @@ class ComplementaryFilter:
         """Towards the reading, by the time since the last one over its sensor's time constant."""
         sensor, value, rotation = reading.sensor, reading.value, matrix(self.attitude.quaternion)
         if sensor == Sensor.MAG:
-            self.attitude.compass(reading, self.told.equipment.declination_rad)
+            self.attitude.compass(reading, self.given.equipment.declination_rad)
         if reading.quality == 0.0 or sensor not in TIME_S or not np.isfinite(value[:2]).all():
             return
         share = min((reading.t_s - self.seen_s.get(sensor, -np.inf)) / TIME_S[sensor], 1.0)
@@ -47,11 +47,11 @@ class ComplementaryFilter:
         elif sensor == Sensor.GPS_VELOCITY and reading.t_s - self.seen_s.get(Sensor.FLOW_RATE, -np.inf) > 1.0:
             self.vel += share * np.nan_to_num(value - self.vel)
         elif sensor == Sensor.FLOW_RATE and np.isfinite(self.range_m):
-            forward, right = flow_velocity(reading, self.range_m, self.told.flow, self.attitude.rate_rad_s[:2])
+            forward, right = flow_velocity(reading, self.range_m, self.given.flow, self.attitude.rate_rad_s[:2])
             u, v, _ = rotation.T @ self.vel
             self.vel += share * rotation @ np.array([forward - u, right - v, 0.0])
         elif sensor == Sensor.RANGE:
-            self.range_m, height_m = value[0], (value[0] + self.told.height.range_below_m) * rotation[2, 2]
+            self.range_m, height_m = value[0], (value[0] + self.given.height.range_below_m) * rotation[2, 2]
             self.ground_d_m = self.pos[2] + height_m if first else self.ground_d_m
             off = self.ground_d_m - height_m - self.pos[2]
             self.pos[2], self.vel[2] = self.pos[2] + share * off, self.vel[2] + share * off / 2.0

@@ -11,7 +11,7 @@ from flownav.core.compile import arctan2, cos, equation, replacing, sin
 from flownav.core.frames import GRAVITY_M_S2, quaternion_product, rotation_from_quaternion, to_body, to_earth
 from flownav.core.measurement import Sensor
 from flownav.navigation.records import Reading
-from flownav.parts.equations import EquationFilter, Said
+from flownav.parts.equations import EquationEstimate, EquationFilter
 
 TILT_S, HEADING_S, GPS_S, VELOCITY_S, FLOW_S, RANGE_S = 5.0, 5.0, 2.0, 0.5, 0.3, 0.3
 LONGEST_S = 0.1  # a gap in the inertial readings is no longer than this
@@ -115,9 +115,9 @@ def by_flow(m: Memory, t_s: float, r: Reading) -> Memory:
     u, v, _ = to_body(rotation, m.vel_n, m.vel_e, m.vel_d)
     off_u, off_v = (r.value_1 - r.value_5) * m.range_m - u, (r.value_4 - r.value_0) * m.range_m - v
     off_n, off_e, _ = to_earth(rotation, off_u, off_v, 0.0)
-    heard = np.isfinite(off_n + off_e)
+    fixed = np.isfinite(off_n + off_e)
     return with_flow(
-        m, vel_n=m.vel_n + k * off_n if heard else m.vel_n, vel_e=m.vel_e + k * off_e if heard else m.vel_e, flow_s=t_s
+        m, vel_n=m.vel_n + k * off_n if fixed else m.vel_n, vel_e=m.vel_e + k * off_e if fixed else m.vel_e, flow_s=t_s
     )
 
 
@@ -166,9 +166,9 @@ def step(m: Memory, t_s: float, sensor: int, r: Reading) -> Memory:
 
 
 @equation
-def say(m: Memory) -> Said:
+def say(m: Memory) -> EquationEstimate:
     """The state as it stands; this filter states no uncertainty."""
-    return Said(
+    return EquationEstimate(
         m.known, m.pos_n, m.pos_e, m.pos_d, m.vel_n, m.vel_e, m.vel_d, m.qw, m.qx, m.qy, m.qz,
         np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, m.grounded, m.ground_d,
     )  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array, Sensor
-from flownav.parts.protocols import Estimate, Imu, Innovation, Reading, Told
+from flownav.parts.protocols import Estimate, GivenSettings, Imu, Innovation, Reading
 from flownav.parts.tools import AttitudeFollower, fix_is_overdue, flow_velocity, gps_variance, matrix
 
 ACCEL_NOISE = 0.3  # of the acceleration that moves the filter, tilt errors and all [m/s2/sqrt(Hz)]
@@ -23,13 +23,13 @@ class FilterPyEkf:
 
     name = "filterpy-ekf"
 
-    def start(self, told: Told) -> None:
+    def start(self, given: GivenSettings) -> None:
         """InputError where FilterPy is not installed."""
         try:
             from filterpy.kalman import ExtendedKalmanFilter
         except ImportError as missing:
             raise InputError("filterpy-ekf: needs the package filterpy; pip install filterpy") from missing
-        self.told, self.attitude, self.t_s, self.range_m = told.settings, AttitudeFollower(), 0.0, np.nan
+        self.given, self.attitude, self.t_s, self.range_m = given.settings, AttitudeFollower(), 0.0, np.nan
         self.ground_d_m: float | None = None
         self.located = False
         self.filter: Any = ExtendedKalmanFilter(dim_x=9, dim_z=1)
@@ -38,7 +38,7 @@ class FilterPyEkf:
     def predict(self, t_s: float, imu: Imu | None) -> None:
         """x <- F x + B a, P <- F P F' + Q, with the specific force turned into the earth's axes."""
         dt_s, self.t_s = min(t_s - self.t_s, 0.1), t_s
-        self.located = self.located or fix_is_overdue(t_s, self.attitude, self.told)
+        self.located = self.located or fix_is_overdue(t_s, self.attitude, self.given)
         accel = self.attitude.predict(dt_s, imu) if imu is not None else np.zeros(3)
         identity, f = np.eye(3), self.filter
         f.F = np.eye(9)
@@ -53,7 +53,7 @@ class FilterPyEkf:
 
     def update(self, reading: Reading) -> list[Innovation]:
         """Each component by itself, as a scalar."""
-        sensor, value, s = reading.sensor, reading.value, self.told
+        sensor, value, s = reading.sensor, reading.value, self.given
         rotation = matrix(self.attitude.quaternion)
         if reading.quality == 0.0 or not np.isfinite(value[:1]).all():
             return []

@@ -12,7 +12,7 @@ import numpy as np
 
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array, Sensor
-from flownav.parts.protocols import Estimate, Imu, Reading, Told
+from flownav.parts.protocols import Estimate, GivenSettings, Imu, Reading
 from flownav.parts.tools import AttitudeFollower, fix_is_overdue, flow_velocity, gps_variance, matrix
 
 EPOCH = datetime(2000, 1, 1)  # Stone Soup keeps time as dates
@@ -26,10 +26,10 @@ class StoneSoupKalman:
 
     name = "stonesoup-kalman"
 
-    def start(self, told: Told) -> None:
+    def start(self, given: GivenSettings) -> None:
         """InputError where Stone Soup is not installed."""
         self.soup = _stone_soup()
-        self.told, self.attitude, self.range_m = told.settings, AttitudeFollower(), np.nan
+        self.given, self.attitude, self.range_m = given.settings, AttitudeFollower(), np.nan
         self.t_s, self.gathered, self.gathered_s = 0.0, np.zeros(3), 0.0
         self.ground_d_m: float | None = None
         self.state: Any = None
@@ -40,7 +40,7 @@ class StoneSoupKalman:
         if imu is not None:
             self.gathered = self.gathered + self.attitude.predict(dt_s, imu) * dt_s
         self.gathered_s += dt_s
-        if self.state is None and fix_is_overdue(t_s, self.attitude, self.told):
+        if self.state is None and fix_is_overdue(t_s, self.attitude, self.given):
             self._fix(np.zeros(3), np.zeros(3))
         if self.state is not None and self.gathered_s >= STEP_S:
             self._step()
@@ -59,7 +59,7 @@ class StoneSoupKalman:
 
     def update(self, reading: Reading) -> None:
         """Positions and velocities NED as Stone Soup's linear measurements."""
-        sensor, value, s = reading.sensor, reading.value, self.told
+        sensor, value, s = reading.sensor, reading.value, self.given
         rotation = matrix(self.attitude.quaternion)
         if reading.quality == 0.0 or not np.isfinite(value[:1]).all():
             return

@@ -256,7 +256,7 @@ def play(paths: Sequence[Path], on_log: Callable[[str], None]) -> tuple[list[Row
 
 def page(rows: Sequence[Row], left_out: Sequence[LeftOut]) -> str:
     """The league as Markdown."""
-    said = HEAD.format(version=__version__) + markdown(rows)
+    text = HEAD.format(version=__version__) + markdown(rows)
     if left_out:
-        said += "\nNot in the table:\n\n" + "".join(f"- `{name}`: {why}\n" for name, why in left_out)
-    return said
+        text += "\nNot in the table:\n\n" + "".join(f"- `{name}`: {why}\n" for name, why in left_out)
+    return text

@@ -12,6 +12,7 @@ from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY
 from flownav.logs.log import Log, attitude_at, attitude_rates
 from flownav.replays.bundle import with_attitude
+from flownav.studies.explain.autopilot_settings import AutopilotSettings, settings_stated
 from flownav.studies.explain.sign import Window
 from flownav.studies.explain.signals import (
     Flags,
@@ -19,7 +20,6 @@ from flownav.studies.explain.signals import (
     running_median,
     stretches,
 )
-from flownav.studies.explain.told import Told, told
 
 LIFTED_M, LIFTED_BY_OTHERS_M, GROUND_RANGE_M = 0.15, 0.6, 0.6
 LEAST_LONGEST, JUMP_M, JUMP_SHARE = 5, 0.3, 0.1
@@ -56,7 +56,7 @@ class Own(NamedTuple):
     t_s: Array
     pos_ned_m: Array
     vel_ned_m_s: Array
-    told_velocity: bool
+    states_velocity: bool
 
 
 @dataclass(frozen=True)
@@ -66,9 +66,9 @@ class Aloft:
     log: Log
 
     @cached_property
-    def told(self) -> Told:
+    def own_settings(self) -> AutopilotSettings:
         """The autopilot's settings, as read from its parameters."""
-        return told(self.log.parameters)
+        return settings_stated(self.log.parameters)
 
     @cached_property
     def attitude(self) -> Stream | None:
@@ -230,12 +230,12 @@ class Aloft:
         if table is None or len(table["t_s"]) < START_ROWS:
             return None
         t_s, pos = np.asarray(table["t_s"], float), np.column_stack([table[name] for name in POSITION_NED])
-        told_velocity = set(VELOCITY_BODY) <= table.keys() and set(QUATERNION) <= table.keys()
-        if told_velocity:
+        states_velocity = set(VELOCITY_BODY) <= table.keys() and set(QUATERNION) <= table.keys()
+        if states_velocity:
             body = np.column_stack([table[name] for name in VELOCITY_BODY]).astype(float)
             turned = np.column_stack([table[name] for name in QUATERNION]).astype(float)
             vel: Array = np.column_stack(to_earth(rotation_from_quaternion(*turned.T), *body.T))
         else:
             vel = np.gradient(pos, np.maximum(t_s, np.arange(len(t_s)) * 1e-6), axis=0)
         good = np.isfinite(pos).all(axis=1) & np.isfinite(vel).all(axis=1)
-        return Own(t_s[good], pos[good], vel[good], told_velocity) if good.sum() > START_ROWS else None
+        return Own(t_s[good], pos[good], vel[good], states_velocity) if good.sum() > START_ROWS else None

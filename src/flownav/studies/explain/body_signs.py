@@ -10,10 +10,10 @@ from flownav.studies.explain.signals import Flags, at, gap_near, running_mean, s
 
 NO_IMU = Lack("no inertial readings of 20 Hz or more")
 LEAST_IMU_HZ = 20.0
-TOLD_SHAKEN_M_S2 = 30.0  # by ArduPilot's manual (Measuring vibration); a log's own readings may be filtered before
+STATED_SHAKEN_M_S2 = 30.0  # by ArduPilot's manual (Measuring vibration); a log's own readings may be filtered before
 SHAKEN_M_S2, CLIPPED_SHARE, CLIPPED_COUNT, LEAST_EQUAL = 9.0, 0.004, 100.0, 6
 LYING_LEVEL_M_S2, LYING_DOWN_M_S2, LYING_S = 0.8, 0.60, 4.0
-HEARD_S = 1.0  # a speed that is older is not known
+SPEED_AGE_S = 1.0  # a speed that is older is not known
 USUAL_SPREADS = 4.0  # of a gusty flight's own middle
 CHANCE = 3.0  # standard errors
 DRAG_UNKNOWN = 0.7  # of the drag by the speed over ground, since wind and manoeuvres are not known
@@ -60,15 +60,15 @@ def vibration(case: Case) -> Found:
         (Trace("estimate", "z", t_s, force[:, 2]), Trace("gps", "x", t_s, force[:, 0])),
         "In hover z is near -9.8 and x near 0.",
     )
-    shaken = max(level / SHAKEN_M_S2, case.shaken_m_s2 / TOLD_SHAKEN_M_S2)
+    shaken = max(level / SHAKEN_M_S2, case.shaken_m_s2 / STATED_SHAKEN_M_S2)
     return Sign(max(shaken, railed / CLIPPED_SHARE, clips), window, figures, (picture,))
 
 
 def _clips(railed: float, counted: float) -> str:
     """The words about clipping; "" where there is none."""
-    said = [f"in {100.0 * railed:.1f} % of its readings"] if railed >= 5e-4 else []
-    said += [f"{counted:.0f} times by the vehicle's count"] if counted > 0.0 else []
-    return f", and clips: {' and '.join(said)}" if said else ""
+    phrases = [f"in {100.0 * railed:.1f} % of its readings"] if railed >= 5e-4 else []
+    phrases += [f"{counted:.0f} times by the vehicle's count"] if counted > 0.0 else []
+    return f", and clips: {' and '.join(phrases)}" if phrases else ""
 
 
 def lying(case: Case) -> Found:
@@ -152,7 +152,7 @@ def _body_speed(case: Case, t_s: Array, count: int) -> Array | None:
     body = np.full((len(t_s), 2), np.nan)
     for found in (case.flow_velocity, _gps_in_body(case)):
         if found is not None:
-            body = np.where((gap_near(found[0], t_s) <= HEARD_S)[:, None], at(*found, t_s), body)
+            body = np.where((gap_near(found[0], t_s) <= SPEED_AGE_S)[:, None], at(*found, t_s), body)
     known = np.isfinite(body).all(axis=1)
     if not known.any():
         return None
@@ -222,8 +222,8 @@ def _others_go_on(case: Case, begin: float, end: float) -> bool:
         and len(s) > 20
         and np.median(np.diff(s.t_s)) < 0.6 * (end - begin)
     ]
-    heard = [np.count_nonzero((s.t_s > begin) & (s.t_s < end)) > 0 for s in fast]
-    return bool(heard and sum(heard) > 0.5 * len(heard))
+    sampled = [np.count_nonzero((s.t_s > begin) & (s.t_s < end)) > 0 for s in fast]
+    return bool(sampled and sum(sampled) > 0.5 * len(sampled))
 
 
 def landed(case: Case) -> Found:
@@ -238,7 +238,7 @@ def landed(case: Case) -> Found:
     if len(grid) < 20:
         return nothing(case.flight_s)
     row = np.clip(np.searchsorted(flag.t_s, grid, side="right") - 1, 0, len(flag) - 1)
-    said = flag.value[row, 0] > 0.5
+    landed_stated = flag.value[row, 0] > 0.5
     if case.range_height is not None:
         aloft = np.interp(grid, *case.range_height) > case.ground_range_m + ALOFT_M
         aloft &= case.lifted(grid)
@@ -246,7 +246,7 @@ def landed(case: Case) -> Found:
         aloft = np.min([np.interp(grid, *of) for of in case.other_heights.values()], axis=0) > 1.0
     else:
         return Lack("no height to hold the landing flag against")
-    wrong = said & aloft
+    wrong = landed_stated & aloft
     long = [(a, b) for a, b in stretches(wrong) if grid[b] - grid[a] > 0.5]
     seconds = sum(float(grid[b] - grid[a]) for a, b in long)
     window: Window = (float(grid[long[0][0]]), float(grid[long[-1][1]])) if long else case.flight_s
@@ -259,7 +259,7 @@ def landed(case: Case) -> Found:
                 grid,
                 np.interp(grid, *case.range_height) if case.range_height else np.zeros(len(grid)),
             ),
-            Trace("flow", "reported as landed", grid, said.astype(float)),
+            Trace("flow", "reported as landed", grid, landed_stated.astype(float)),
         ),
     )
     return Sign(seconds / LANDED_S, window, {"seconds": seconds}, (picture,))

@@ -203,7 +203,7 @@ class Case(Aloft):
             return self.gps_velocity[0], np.hypot(*self.gps_velocity[1][:, :2].T)
         if self.base is None:
             return None
-        return self.base.said.t_s, np.hypot(*self.base.said.vel_ned_m_s[:, :2].T)
+        return self.base.estimate_rows.t_s, np.hypot(*self.base.estimate_rows.vel_ned_m_s[:, :2].T)
 
     @cached_property
     def flow_tie(self) -> Tie | None:
@@ -248,13 +248,13 @@ class Case(Aloft):
         return own_gyro(self.log)
 
     # -- the autopilot -------------------------------------------------------------------------------------------
-    def told_of(self, kind: str) -> list[tuple[float, float]]:
+    def events_of(self, kind: str) -> list[tuple[float, float]]:
         """Times and values of the log's events of one kind."""
         return [(row.t_s, row.value) for row in self.log.happened if row.kind == kind]
 
     def source_set_at(self, t_s: Array) -> Array:
         """The number of EKF3's source set at instants; 1 until the log reports another."""
-        switched = self.told_of(SOURCE_SET)
+        switched = self.events_of(SOURCE_SET)
         times = np.array([-np.inf, *(t for t, _ in switched)])
         numbers = np.array([1.0, *(value for _, value in switched)])
         return np.asarray(numbers[np.searchsorted(times, t_s, side="right") - 1])
@@ -264,35 +264,35 @@ class Case(Aloft):
         """The share of the flight in which the autopilot's filter took the flow; None where the log does not report
         it.
         """
-        said = self.told_of(FUSES_FLOW)
-        if not said:
+        events = self.events_of(FUSES_FLOW)
+        if not events:
             return None
         grid = np.arange(*self.flight_s, 0.1)
-        times, values = np.array([t for t, _ in said]), np.array([value for _, value in said])
+        times, values = np.array([t for t, _ in events]), np.array([value for _, value in events])
         row = np.searchsorted(times, grid, side="right") - 1
         return float(np.mean(np.where(row >= 0, values[np.maximum(row, 0)], 0.0))) if len(grid) else None
 
     @cached_property
     def clipped(self) -> float | None:
         """How many accelerometer samples the vehicle counted as clipped until it landed; None where it reports none."""
-        said = [(t, value) for t, value in self.told_of(CLIPPING) if t <= self.flight_s[1]]
-        return said[-1][1] - said[0][1] if said else None
+        events = [(t, value) for t, value in self.events_of(CLIPPING) if t <= self.flight_s[1]]
+        return events[-1][1] - events[0][1] if events else None
 
     @cached_property
     def shaken_m_s2(self) -> float:
         """The level of vibration that the vehicle reported over at least two seconds of its flight; 0 where it reports
         none.
         """
-        told = [(t, v) for t, v in self.told_of(VIBRATION) if t <= self.flight_s[1]]
-        ends = [t for t, _ in told[1:]] + [self.flight_s[1]]
-        held = [v for (t, v), end in zip(told, ends, strict=False) if end - max(t, self.flight_s[0]) >= SHAKEN_S]
+        shakes = [(t, v) for t, v in self.events_of(VIBRATION) if t <= self.flight_s[1]]
+        ends = [t for t, _ in shakes[1:]] + [self.flight_s[1]]
+        held = [v for (t, v), end in zip(shakes, ends, strict=False) if end - max(t, self.flight_s[0]) >= SHAKEN_S]
         return max(held, default=0.0)
 
     # -- the second navigator ------------------------------------------------------------------------------------
     @cached_property
     def options(self) -> ReplayOptions:
         """The options of the log's replay: with the GPS delay of the autopilot's parameters, where they state one."""
-        delay = self.told.gps_delay_s
+        delay = self.own_settings.gps_delay_s
         return ReplayOptions() if delay is None or not 0.0 < delay <= 1.0 else ReplayOptions(gps_delay_s=delay)
 
     @cached_property

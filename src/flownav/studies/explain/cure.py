@@ -8,9 +8,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from flownav.lab.identification.parameter_file import AUTOPILOTS, FLOAT, INTEGER, Parameter, file_text
+from flownav.studies.explain.autopilot_settings import ARDUPILOT, INAV, PX4
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.sign import Sign
-from flownav.studies.explain.told import ARDUPILOT, INAV, PX4
 
 SUFFIX = AUTOPILOTS
 

@@ -2,10 +2,10 @@
 
 from flownav.lab.identification.parameter_file import FLOAT, INTEGER, within
 from flownav.lab.identification.scalers import INAV_DEFAULT
+from flownav.studies.explain.autopilot_settings import INAV_SCALE
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.cure import Cure, Settings, by_hand_only, decimal, either, number, whole
 from flownav.studies.explain.sign import Sign
-from flownav.studies.explain.told import INAV_SCALE
 
 EIGHTH_DEG, NEAR_EIGHTH_DEG = 45.0, 12.0
 PX4_OF_DELAY_MS, EKF3_DELAY_MS, EKF3_AVERAGING_MS = 300.0, 250.0, 50.0
@@ -26,7 +26,7 @@ def axes(case: Case, sign: Sign, dialect: str) -> Cure:
     """The mounting's rotation, where that is what is wrong."""
     if sign.figures["mirrored"]:
         return Cure((), "No rotation mends a mirrored sensor: mend the driver's signs, or its firmware.", holds=False)
-    turn = (case.told.flow_turn_deg or 0.0) - number(sign, "turn_deg")
+    turn = (case.own_settings.flow_turn_deg or 0.0) - number(sign, "turn_deg")
     eighths = round(turn / EIGHTH_DEG) % 8
     reason = f"the flow is turned by {-number(sign, 'turn_deg'):.0f} degrees from the set rotation"
     near = abs((turn - eighths * EIGHTH_DEG + 180.0) % 360.0 - 180.0) <= NEAR_EIGHTH_DEG
@@ -41,9 +41,9 @@ def scale(case: Case, sign: Sign, dialect: str) -> Cure:
     """The factor on the flow."""
     x, y = number(sign, "x"), number(sign, "y")
     reason = f"the flow reads {sign.figures['read']}"
-    now, gain = case.told.scale_x or 1.0, number(sign, "gain")
+    now, gain = case.own_settings.scale_x or 1.0, number(sign, "gain")
     scalers = []
-    for axis, one, was in (("X", x, case.told.scale_x or 1.0), ("Y", y, case.told.scale_y or 1.0)):
+    for axis, one, was in (("X", x, case.own_settings.scale_x or 1.0), ("Y", y, case.own_settings.scale_y or 1.0)):
         per_mille = float(round(1e3 * (was / one - 1.0)))
         name = f"FLOW_F{axis}SCALER"
         scalers.append(within(name, per_mille, -SCALER_ARDUPILOT, SCALER_ARDUPILOT, INTEGER, reason))
@@ -80,12 +80,14 @@ def texture(case: Case, sign: Sign, dialect: str) -> Cure:
     """Reject flow that the sensor itself rates as poor, and trust the rest less."""
     quality = number(sign, "quality")
     least = min(max(quality + 20.0, 30.0), 150.0)
-    told = case.told.least_quality or 0.0
-    one = case.told.set_at(1)
+    least_stated = case.own_settings.least_quality or 0.0
+    one = case.own_settings.set_at(1)
     aided = one is not None and one.gps and case.gps_velocity is not None
     px4: Settings = (decimal("EKF2_OF_N_MAX", 0.8, "rad/s: poor pictures count for less"),)
     if aided:  # without another velocity poor flow is better than none
-        px4 += (whole("EKF2_OF_QMIN", round(max(least, told)), f"quality was {quality:.0f} where it saw nothing"),)
+        px4 += (
+            whole("EKF2_OF_QMIN", round(max(least, least_stated)), f"quality was {quality:.0f} where it saw nothing"),
+        )
     ardupilot = (decimal("EK3_FLOW_M_NSE", 0.5, "rad/s: flow counts for less beside the inertial readings"),)
     words = "Light the ground, or lay a pattern on it; fly lower. No parameter gives the sensor something to see."
     return either(dialect, px4, ardupilot, words, holds=False)

@@ -18,7 +18,7 @@ from flownav.studies.explain.signals import Fit, at, high_pass, spread, turn_of
 
 NO_FLOW, NO_RATES = Lack("no optical flow"), Lack("no inertial readings and no attitude to hold the flow against")
 TURN_RAD, SCALE_OFF, LATE_S, EARLY_S, CLOCK_S = 0.45, 0.22, 0.06, 0.15, 0.33
-UNTOLD_LATE_S = 0.25  # a delay that nobody states is no mistake until it is larger than any default
+UNSTATED_LATE_S = 0.25  # a delay that nobody states is no mistake until it is larger than any default
 SIGNIFICANT = 4.0  # standard errors
 LEAST_RELIABLE, LEAST_LIKENESS, KNOWN_TO = 0.8, 0.9, 0.15
 MODEL_SIGMA = 0.05  # of a gain: what the expectation itself may be off by
@@ -239,12 +239,12 @@ def delay(case: Case) -> Found:
     lag = found_lag(case)
     if lag is None:
         return Lack("too little turning to know how old the flow is")
-    told_s = case.told.flow_delay_s
+    stated_s = case.own_settings.flow_delay_s
     if lag > CLOCK_S or lag < -EARLY_S:  # that is a clock
         return nothing(case.flight_s, lag_s=lag)
-    late = (lag - told_s) / LATE_S if told_s is not None else lag / UNTOLD_LATE_S
-    early = (told_s - lag) / (2.0 * EARLY_S) if told_s is not None else 0.0
-    was = "no value" if told_s is None else f"{1e3 * told_s:.0f} ms"
+    late = (lag - stated_s) / LATE_S if stated_s is not None else lag / UNSTATED_LATE_S
+    early = (stated_s - lag) / (2.0 * EARLY_S) if stated_s is not None else 0.0
+    was = "no value" if stated_s is None else f"{1e3 * stated_s:.0f} ms"
     figures: dict[str, float | str] = {"lag_ms": 1e3 * lag, "told": was}
     return Sign(max(late, early, 0.0), case.flight_s, figures, (expected_picture(case),))
 

@@ -1,14 +1,14 @@
 """Cures of a height estimate that follows another quantity than the height."""
 
+from flownav.studies.explain.autopilot_settings import ARDUPILOT, RANGE
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.cure import Cure, Settings, decimal, either, number, whole
 from flownav.studies.explain.sign import Sign
-from flownav.studies.explain.told import ARDUPILOT, RANGE
 
 
 def _not_by_range(case: Case, dialect: str) -> Cure:
     """The height from barometer or GPS instead of the range."""
-    one = case.told.set_at(1)
+    one = case.own_settings.set_at(1)
     if one is None or one.height != RANGE:
         return Cure((), "")
     reason = "the height must not follow what is below"
@@ -77,7 +77,7 @@ def terrain(case: Case, sign: Sign, dialect: str) -> Cure:
 
 def wash(case: Case, sign: Sign, dialect: str) -> Cure:
     """Let something else hold the height near the ground."""
-    one = case.told.set_at(1)
+    one = case.own_settings.set_at(1)
     gps, ranged = one is not None and one.gps, case.ranges is not None
     off = f"the barometer is {abs(number(sign, 'metres')):.1f} m off with the rotors on"
     px4: Settings = (
@@ -105,7 +105,7 @@ def deadlock(case: Case, sign: Sign, dialect: str) -> Cure:
 
 def height_noise(case: Case, sign: Sign, dialect: str) -> Cure:
     """The noise that the height's source has."""
-    one = case.told.set_at(1)
+    one = case.own_settings.set_at(1)
     name, value = ("EKF2_RNG_NOISE", 0.1) if one is not None and one.height == RANGE else ("EKF2_BARO_NOISE", 3.5)
     return either(
         dialect,

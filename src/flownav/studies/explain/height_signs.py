@@ -5,10 +5,10 @@ import numpy as np
 from flownav.core.measurement import Array, Sensor
 from flownav.logs.log import integrated
 from flownav.studies.explain.aloft import GROUND_RANGE_M, LIFTED_M, without_echo
+from flownav.studies.explain.autopilot_settings import BARO, RANGE
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.sign import Found, Lack, Picture, Sign, Trace, Window, nothing
 from flownav.studies.explain.signals import Flags, at, gap_near, high_pass, running_median, stretches
-from flownav.studies.explain.told import BARO, RANGE
 
 NO_RANGE = Lack("no range")
 MISSING_S, NEAR_S, REACHED_SHARE, LEFT_SHARE = 3.0, 0.6, 0.8, 0.4
@@ -36,7 +36,7 @@ def reach(case: Case) -> Found:
         return Lack("no other height to know how high it was without a range")
     height_m = np.median(heights, axis=0)
     reached = float(np.quantile(range_m, 0.995))
-    limit = case.told.range_high_m
+    limit = case.own_settings.range_high_m
     ceiling = min(reached, limit) if limit is not None else reached
     missing &= height_m > REACHED_SHARE * ceiling - 0.2
     missing &= np.interp(grid, t_s, range_m) > LEFT_SHARE * ceiling  # what ends near the ground was too near
@@ -62,7 +62,7 @@ def _needs_range(case: Case, t_s: Array) -> float:
     place = case.stream(Sensor.GPS_POSITION)
     without = np.ones(len(t_s), bool) if place is None else gap_near(place.t_s, t_s) > 1.0
     numbers = case.source_set_at(t_s)
-    for one in case.told.sets:
+    for one in case.own_settings.sets:
         mine = numbers == one.number
         without |= mine & (one.height == RANGE)
         without |= mine & one.flow & (not one.gps)
@@ -78,8 +78,8 @@ def stuck(case: Case) -> Found:
     same = np.concatenate([[False], (np.diff(range_m) == 0.0) & (np.diff(t_s) < BROKEN_S)])
     inside = (t_s >= case.flight_s[0]) & (t_s <= case.flight_s[1])
     floor = range_m <= float(np.quantile(range_m, 0.02)) + 0.02
-    heard = ~without_echo(range_m)
-    runs = [(a, b) for a, b in stretches(same & inside & heard & ~floor) if b - a >= LEAST_REPEATS] or [(0, 0)]
+    no_echo = ~without_echo(range_m)
+    runs = [(a, b) for a, b in stretches(same & inside & no_echo & ~floor) if b - a >= LEAST_REPEATS] or [(0, 0)]
     lasts = np.array([t_s[b] - t_s[max(a - 1, 0)] for a, b in runs])
     longest = int(np.argmax(lasts))
     others = np.delete(lasts, longest)
@@ -211,8 +211,8 @@ def _unmoved(case: Case, t_s: Array, step: Array) -> Array:
     """
     witnesses = []
     if case.inertial_velocity is not None and case.base is not None:
-        witnesses.append((case.base.said.t_s, case.base.said.vel_ned_m_s[:, 2]))
-    if case.own is not None and case.own.told_velocity:
+        witnesses.append((case.base.estimate_rows.t_s, case.base.estimate_rows.vel_ned_m_s[:, 2]))
+    if case.own is not None and case.own.states_velocity:
         witnesses.append((case.own.t_s, case.own.vel_ned_m_s[:, 2]))
     if not witnesses:
         return step
@@ -230,14 +230,14 @@ def _harm_of_steps(case: Case, found: list[tuple[float, float]]) -> float:
     """1 where a step of the ground does harm: the range is the height's source, the only one, or its own height
     stepped with it; else little.
     """
-    if any(one.height == RANGE for one in case.told.sets):
+    if any(one.height == RANGE for one in case.own_settings.sets):
         return 1.0
-    if case.own is not None and not case.told.sets:
+    if case.own is not None and not case.own_settings.sets:
         height = -case.own.pos_ned_m[:, 2]
         moved = [np.interp(t + 0.8, case.own.t_s, height) - np.interp(t - 0.8, case.own.t_s, height) for t, _ in found]
         followed = np.median([-change / size if size else 0.0 for change, (_, size) in zip(moved, found, strict=True)])
         return 1.0 if abs(followed) > FOLLOWED else HARMLESS
-    alone = not case.told.sets and not ({Sensor.BARO, Sensor.GPS_POSITION} & case.log.streams.keys())
+    alone = not case.own_settings.sets and not ({Sensor.BARO, Sensor.GPS_POSITION} & case.log.streams.keys())
     return 1.0 if alone else HARMLESS
 
 
@@ -293,7 +293,7 @@ def wash(case: Case) -> Found:
         (Trace("estimate", "barometer less range", t_s[near], off[near] - zero),),
         "Over level ground it stays where it was before take-off.",
     )
-    held = [one.height for one in case.told.sets if one.height is not None][:1]
+    held = [one.height for one in case.own_settings.sets if one.height is not None][:1]
     harm = 1.0 if not held or held[0] == BARO else NOT_THE_HEIGHT
     return Sign(harm * abs(change) / WASH_M, (start, end), {"metres": change}, (picture,))
 

@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.logs.log import Log
+from flownav.studies.explain.autopilot_settings import dialect_of
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.cure import Cure, text_of
 from flownav.studies.explain.sign import Found, Lack, Picture, Sign, Window
 from flownav.studies.explain.table import BY_NAME, HYPOTHESES, Hypothesis
-from flownav.studies.explain.told import dialect_of
 from flownav.studies.explain.trials import Trial, tried
 
 STEEPNESS, MIDDLE = 6.0, 1.0  # odds = (strength / MIDDLE) ** STEEPNESS
@@ -78,11 +78,11 @@ class Explanation(NamedTuple):
         if self.first is None:
             return f"Nothing wrong was found; {len(self.checked)} causes were looked for."
         t0, t1 = self.first.window_s
-        said = [f"{t0:.0f} to {t1:.0f} s", f"{min(100.0 * self.first.probability, 99.0):.0f} % sure"]
+        phrases = [f"{t0:.0f} to {t1:.0f} s", f"{min(100.0 * self.first.probability, 99.0):.0f} % sure"]
         drift_m = self.first.drift_m
         if drift_m is not None and drift_m > ASTRAY_M:
-            said.append(f"meanwhile the autopilot's own estimate went {drift_m:.1f} m astray")
-        return f"{self.first.sentence} ({'; '.join(said)})"
+            phrases.append(f"meanwhile the autopilot's own estimate went {drift_m:.1f} m astray")
+        return f"{self.first.sentence} ({'; '.join(phrases)})"
 
     def cure_text(self, dialect: str = "") -> str:
         """The parameter file against the causes, for the log's own autopilot or another. ValueError of no dialect."""
@@ -145,7 +145,7 @@ def _look(one: Hypothesis, case: Case) -> Found:
 def consequences(checked: list[Checked]) -> list[Checked]:
     """Each that another likely cause explains, which happened at the same time."""
     likely = {one.hypothesis.name: one for one in checked if one.probability >= LIKELY}
-    told = []
+    kept_causes = []
     for one in checked:
         cause = next(
             (
@@ -159,8 +159,8 @@ def consequences(checked: list[Checked]) -> list[Checked]:
             ),
             "",
         )
-        told.append(one._replace(consequence_of=cause if one.probability >= SHOWN else ""))
-    return told
+        kept_causes.append(one._replace(consequence_of=cause if one.probability >= SHOWN else ""))
+    return kept_causes
 
 
 def _overlap(one: Window, other: Window) -> bool:
@@ -174,19 +174,19 @@ def _tried(case: Case, checked: list[Checked]) -> list[Checked]:
         key=lambda one: -one.probability,
     )
     names = {one.hypothesis.name for one in candidates[:MOST_TRIED]}
-    told = []
+    kept_causes = []
     for one in checked:
         if one.hypothesis.name not in names:
-            told.append(one)
+            kept_causes.append(one)
             continue
         trial = tried(case, one.sign, one.hypothesis.repair)
         worse = trial.explained is not None and trial.explained < WORSE
-        told.append(
+        kept_causes.append(
             one._replace(
                 trial=trial, probability=one.probability * (WORSE_FACTOR if worse and one.probability < 0.95 else 1.0)
             )
         )
-    return told
+    return kept_causes
 
 
 def _rank(one: Checked) -> float:

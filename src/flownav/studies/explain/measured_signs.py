@@ -19,7 +19,7 @@ def interval(case: Case) -> Found:
     if case.rates is None:
         return NO_RATES
     turned = case.own_gyro
-    if turned is None or not turned.told:
+    if turned is None or not turned.is_known:
         return Lack("no gyro in the flow sensor that turns with the vehicle, about the same axes")
     slope = turned.slope
     known = gains(case)

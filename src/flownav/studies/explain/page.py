@@ -22,7 +22,7 @@ SLACK_S = 2.0
 
 def facts(explained: Explanation) -> dict[str, Any]:
     """The output of `flownav explain --json`, except the files that it wrote."""
-    told: dict[str, Any] = finite(
+    facts_found: dict[str, Any] = finite(
         {
             "log": explained.log,
             "verdict": explained.verdict,
@@ -33,7 +33,7 @@ def facts(explained: Explanation) -> dict[str, Any]:
             "missing": [{"cause": name, "what": what} for name, what in explained.missing],
         }
     )
-    return told
+    return facts_found
 
 
 def _cause(one: Finding) -> dict[str, Any]:
@@ -84,9 +84,9 @@ def lines(explained: Explanation) -> list[tuple[str, ...]]:
     for one in order:
         share = one.trial.explained if one.trial is not None else None
         t0, t1 = one.sign.window_s
-        said = one.trial.words if one.trial is not None else DASH
+        trial_words = one.trial.words if one.trial is not None else DASH
         if one.consequence_of:
-            said = f"follows from: {inside(words()[one.consequence_of]['title'])}"
+            trial_words = f"follows from: {inside(words()[one.consequence_of]['title'])}"
         likely = one.probability >= LEAST_SHOWN
         found.append(
             (
@@ -95,7 +95,7 @@ def lines(explained: Explanation) -> list[tuple[str, ...]]:
                 f"{100.0 * one.probability:.0f} %" if likely else "below 2 %",
                 DASH if share is None else f"{100.0 * share:.0f} %",
                 f"{t0:.0f} to {t1:.0f}" if likely else DASH,
-                said,
+                trial_words,
             )
         )
     return found

@@ -1,9 +1,9 @@
 """Cures of GPS, of the compass and of the choice among sources."""
 
+from flownav.studies.explain.autopilot_settings import ARDUPILOT, PX4
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.cure import Cure, Settings, decimal, either, number, whole
 from flownav.studies.explain.sign import Sign
-from flownav.studies.explain.told import ARDUPILOT, PX4
 
 EIGHTH_DEG, NEAR_EIGHTH_DEG = 45.0, 16.0
 PX4_GPS_DELAY_MS, EKF3_DELAY_MS = 300.0, 250.0
@@ -106,7 +106,7 @@ def bad_switch(case: Case, sign: Sign, dialect: str) -> Cure:
     """Let a script choose, by range and quality."""
     ardupilot = (
         whole("SCR_ENABLE", 1.0, "for ahrs-source-gps-optflow.lua, which looks before it switches"),
-        decimal("SCR_USER1", round(0.8 * (case.told.range_high_m or 5.0), 1), "m: no flow above this range"),
+        decimal("SCR_USER1", round(0.8 * (case.own_settings.range_high_m or 5.0), 1), "m: no flow above this range"),
         decimal("SCR_USER3", 50.0, "no flow of a lower quality"),
     )
     return either(

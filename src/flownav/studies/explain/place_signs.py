@@ -10,7 +10,7 @@ from flownav.studies.explain.sign import Found, Lack, Picture, Sign, Trace, noth
 from flownav.studies.explain.signals import at, running_mean, stretches
 
 GLITCH_M, WALK_M, UNBROKEN_S = 4.0, 9.5, 2.0  # in one step; within half a minute; no gap for so long
-LAG_S, UNTOLD_LAG_S, USUAL_LAG_S = 0.42, 0.50, 0.22  # a receiver's own velocity lags by 0.2 s beside its delay
+LAG_S, UNSTATED_LAG_S, USUAL_LAG_S = 0.42, 0.50, 0.22  # a receiver's own velocity lags by 0.2 s beside its delay
 TURN_RAD, SIGNIFICANT = 0.45, 4.0
 LAST_S, LEAST_ROWS = 5.0, 8  # before it lands; logs end soon after
 SETTLED_S, OFF_S, OFF_TURNS = 1.5, 4.0, 1.2  # a field that was off for this long, by this multiple of TURN_RAD
@@ -74,12 +74,12 @@ def lag(case: Case) -> Found:
     tie = case.heading_tie
     if tie is None:
         return Lack("too little motion, or no inertial readings, to know how old the fixes are")
-    told_s = case.told.gps_delay_s
-    over = tie.lag_s - (told_s if told_s is not None else USUAL_LAG_S)
-    strength = max(over, 0.0) / (LAG_S if told_s is not None else UNTOLD_LAG_S)
+    stated_s = case.own_settings.gps_delay_s
+    over = tie.lag_s - (stated_s if stated_s is not None else USUAL_LAG_S)
+    strength = max(over, 0.0) / (LAG_S if stated_s is not None else UNSTATED_LAG_S)
     figures: dict[str, float | str] = {
         "lag_ms": 1e3 * tie.lag_s,
-        "told": "no value" if told_s is None else f"{1e3 * told_s:.0f} ms",
+        "told": "no value" if stated_s is None else f"{1e3 * stated_s:.0f} ms",
     }
     if case.gps_velocity is None or case.inertial_velocity is None:
         return nothing(case.flight_s, strength)
@@ -89,7 +89,14 @@ def lag(case: Case) -> Found:
         (
             Trace("gps", "GPS", t_s, gps[:, 0]),
             *(
-                [Trace("estimate", "the navigator", case.base.said.t_s, case.base.said.vel_ned_m_s[:, 0])]
+                [
+                    Trace(
+                        "estimate",
+                        "the navigator",
+                        case.base.estimate_rows.t_s,
+                        case.base.estimate_rows.vel_ned_m_s[:, 0],
+                    )
+                ]
                 if case.base
                 else []
             ),
@@ -160,8 +167,8 @@ def _went_off(case: Case) -> Sign | None:
     ), "Over the ground the field points one way; here it leaves the heading that it agreed with.")  # fmt: skip
     window = (float(t_s[off[0]]), float(t_s[off[-1]])) if len(off) else case.flight_s
     degrees = float(np.degrees(turn[worst]))
-    said = f"In flight the compass went off by {abs(degrees):.0f} degrees from the heading that it agreed with"
-    return Sign(strength, window, {"turn_deg": degrees, "said": said, "in_flight": 1.0}, (picture,))
+    sentence = f"In flight the compass went off by {abs(degrees):.0f} degrees from the heading that it agreed with"
+    return Sign(strength, window, {"turn_deg": degrees, "said": sentence, "in_flight": 1.0}, (picture,))
 
 
 def _course_picture(case: Case) -> tuple[Picture, ...]:

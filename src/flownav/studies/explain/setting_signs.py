@@ -4,11 +4,11 @@ import numpy as np
 
 from flownav.core.measurement import Sensor
 from flownav.logs.happened import SOURCE_SET
+from flownav.studies.explain.autopilot_settings import PX4, RANGE
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.sight_signs import blind_bins
 from flownav.studies.explain.sign import Found, Lack, Picture, Sign, Trace, nothing
 from flownav.studies.explain.signals import gap_near
-from flownav.studies.explain.told import PX4, RANGE
 
 NO_PARAMETERS = Lack("the log has no parameters of the autopilot's filter")
 SURE = 4.0
@@ -22,9 +22,9 @@ FUSED_AFTER_ALL = 0.3
 def deadlock(case: Case) -> Found:
     """PX4: the range is the height, so that the ground is not estimated; flow waits for it, and nothing else aids."""
     p = case.log.parameters
-    if case.told.dialect != PX4 or "EKF2_HGT_REF" not in p:
-        return Lack("PX4 1.14 and later alone can have it") if case.told.dialect != PX4 else NO_PARAMETERS
-    one = case.told.set_at(1)
+    if case.own_settings.dialect != PX4 or "EKF2_HGT_REF" not in p:
+        return Lack("PX4 1.14 and later alone can have it") if case.own_settings.dialect != PX4 else NO_PARAMETERS
+    one = case.own_settings.set_at(1)
     waits = one is not None and one.height == RANGE and one.flow and p.get("EKF2_RNG_CTRL", 1.0) >= 1.0
     gps = one is not None and one.gps and case.stream(Sensor.GPS_POSITION) is not None
     other = gps or p.get("EKF2_EV_CTRL", 0.0) > 0.0
@@ -33,13 +33,13 @@ def deadlock(case: Case) -> Found:
     fused = case.fused_share
     if fused is not None and fused > FUSED_AFTER_ALL:
         return nothing(case.flight_s, 0.5, fused=100.0 * fused)
-    said = "" if fused is None else f"EKF2 took the flow in {100.0 * fused:.0f} % of the flight"
-    return Sign(SURE if fused is not None else 0.6 * SURE, case.flight_s, {"said": said}, _flow_picture(case))
+    sentence = "" if fused is None else f"EKF2 took the flow in {100.0 * fused:.0f} % of the flight"
+    return Sign(SURE if fused is not None else 0.6 * SURE, case.flight_s, {"said": sentence}, _flow_picture(case))
 
 
 def height_noise(case: Case) -> Found:
     """Finds a stated noise of the height's source so large that nothing holds the height."""
-    noise = case.told.height_noise_m
+    noise = case.own_settings.height_noise_m
     if noise is None:
         return Lack("no parameter states the noise of the height's source")
     figures: dict[str, float | str] = {"noise_m": noise}
@@ -56,7 +56,7 @@ def refused(case: Case) -> Found:
     """Flow that the parameters keep out: its quality, its height or its rate lies beyond what they allow."""
     if case.flow is None:
         return Lack("no optical flow")
-    t, flow = case.told, case.flow
+    t, flow = case.own_settings, case.flow
     if all(limit is None for limit in (t.least_quality, t.flow_low_m, t.flow_high_m)):
         return Lack("no parameter that states limits of the flow")
     good = flow.lifted & (flow.quality > 0.0)
@@ -94,7 +94,7 @@ def refused(case: Case) -> Found:
 
 def never_switched(case: Case) -> Found:
     """No GPS for long, sound flow at hand, and the sources in use do not take it."""
-    if not case.told.sets:
+    if not case.own_settings.sets:
         return NO_PARAMETERS
     if case.flow is None:
         return Lack("no optical flow")
@@ -105,31 +105,31 @@ def never_switched(case: Case) -> Found:
     without = np.ones(len(grid), bool) if place is None else gap_near(place.t_s, grid) > GPS_GONE_S
     numbers = case.source_set_at(grid)
     takes = np.zeros(len(grid), bool)
-    for one in case.told.sets:
+    for one in case.own_settings.sets:
         takes |= (numbers == one.number) & (one.flow or one.external)
     sound = gap_near(case.flow.t_s[case.flow.quality > 0.0], grid) < 0.5
     unaided = without & ~takes & sound
     seconds = 0.1 * float(np.count_nonzero(unaided))
     rows = np.flatnonzero(unaided)
     window = (float(grid[rows[0]]), float(grid[rows[-1]])) if len(rows) else case.flight_s
-    other = next((one.number for one in case.told.sets if one.flow), 0)
-    switched = len(case.told_of(SOURCE_SET))
+    other = next((one.number for one in case.own_settings.sets if one.flow), 0)
+    switched = len(case.events_of(SOURCE_SET))
     figures: dict[str, float | str] = {"seconds": seconds, "flow_set": float(other), "switched": float(switched)}
     return Sign(seconds / UNAIDED_S, window, figures, _flow_picture(case))
 
 
 def bad_switch(case: Case) -> Found:
     """Switched to flow where there was no range or nothing to see."""
-    if not case.told.sets:
+    if not case.own_settings.sets:
         return NO_PARAMETERS
-    switched = case.told_of(SOURCE_SET)
+    switched = case.events_of(SOURCE_SET)
     if case.flow is None:
         return Lack("no optical flow")
     starts, blind = blind_bins(case, case.flow)
     worst, window = 0.0, case.flight_s
     figures: dict[str, float | str] = {}
     for k, (t_s, number) in enumerate(switched):
-        one = case.told.set_at(int(number))
+        one = case.own_settings.set_at(int(number))
         if one is None or not one.flow or one.gps or one.external:
             continue
         if t_s < max(case.flight_s[0], case.log.span_s[0] + 1.0):

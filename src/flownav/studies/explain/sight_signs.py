@@ -148,14 +148,14 @@ def noise(case: Case) -> Found:
     jumps = averaged * np.min([_running_noise(_second(of), count) for of in left], axis=0)
     rows = max(round(NOISE_S / period), 1)
     level = float(np.sort(jumps)[-rows]) if len(jumps) > rows else 0.0
-    told = case.told.flow_noise_rad_s
-    limit = max(NOISY_RAD_S, told or 0.0)
+    noise_stated = case.own_settings.flow_noise_rad_s
+    limit = max(NOISY_RAD_S, noise_stated or 0.0)
     noisy = np.flatnonzero(jumps > 0.6 * max(level, limit))
     size = float(np.median(jumps[noisy])) if len(noisy) >= rows else level
     window = (float(t_s[noisy[0]]), float(t_s[noisy[-1]])) if len(noisy) else case.flight_s
     figures: dict[str, float | str] = {
         "noise_rad_s": size, "usual_rad_s": float(np.median(jumps)),
-        "told": "no value" if told is None else f"{told:.2f} rad/s",
+        "told": "no value" if noise_stated is None else f"{noise_stated:.2f} rad/s",
     }  # fmt: skip
     picture = Picture("flow (rad/s)", (
         Trace("flow", "flow x", t_s, seen[:, 0], dots=True), Trace("gps", "flow y", t_s, seen[:, 1], dots=True),

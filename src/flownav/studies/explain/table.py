@@ -54,7 +54,7 @@ class Hypothesis(NamedTuple):
 def words() -> dict[str, dict[str, str]]:
     """The words of each cause, by its name."""
     content = tomllib.loads(shipped(WORDS_FILE).read_text(encoding="utf-8"))
-    return {name: told for name, told in content.items() if isinstance(told, dict)}
+    return {name: group for name, group in content.items() if isinstance(group, dict)}
 
 
 FLOW_DELAYS = ("EKF2_OF_DELAY", "EK3_FLOW_DELAY")

@@ -15,10 +15,10 @@ from flownav.core.measurement import Array, Sensor, Stream
 from flownav.logs.log import attitude_at
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import Replay
+from flownav.studies.explain.autopilot_settings import RANGE
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.sign import Sign
 from flownav.studies.explain.signals import Flags, at, running_mean
-from flownav.studies.explain.told import RANGE
 
 FLOW, GPS = (Sensor.FLOW_RATE,), (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
 LARGEST_SQUARE = 25.0
@@ -205,7 +205,7 @@ def _of_flow(case: Case, streams: Streams, run: Replay, attitude: Stream | None)
     if good.sum() < LEAST_TESTED or valid.sum() < LEAST_TESTED:
         return 1.0
     t_s = flow.t_s[good]
-    lag = case.told.flow_delay_s if case.told.flow_delay_s is not None else USUAL_DELAY_S
+    lag = case.own_settings.flow_delay_s if case.own_settings.flow_delay_s is not None else USUAL_DELAY_S
     row = np.maximum(np.searchsorted(distance.t_s[valid], t_s, side="right") - 1, 0)
     far = distance.value[valid][row, 0]
     ours = at(case.rates[0], case.rates[1][:, :2], t_s - lag)
@@ -215,22 +215,22 @@ def _of_flow(case: Case, streams: Streams, run: Replay, attitude: Stream | None)
     r = rotation_from_quaternion(*attitude_at(attitude, t_s - lag).T)
     earth = np.column_stack([r[0] * u + r[1] * v, r[3] * u + r[4] * v])
     count = max(1, round(SMOOTH_S / max(float(np.median(np.diff(t_s))), 1e-3)))
-    apart = running_mean(earth, count) - at(run.said.t_s, run.said.vel_ned_m_s[:, :2], t_s - lag)
+    apart = running_mean(earth, count) - at(run.estimate_rows.t_s, run.estimate_rows.vel_ned_m_s[:, :2], t_s - lag)
     return _capped(np.hypot(*apart.T), FLOW_FLOOR_M_S)
 
 
 def _of_height(case: Case, streams: Streams, run: Replay) -> float:
     """Mismatch of the height's source that is set in the autopilot; of the barometer where none is set."""
-    one = case.told.set_at(1)
+    one = case.own_settings.set_at(1)
     source = Sensor.RANGE if one is not None and one.height == RANGE else Sensor.BARO
     stream = streams.get(source)
     if stream is None:
         return 1.0
     good = case.lifted(stream.t_s) & (stream.quality > 0.0)
     height = stream.value[good, 0]
-    ours = -np.interp(stream.t_s[good] - stream.delay_s, run.said.t_s, run.said.pos_ned_m[:, 2])
+    ours = -np.interp(stream.t_s[good] - stream.delay_s, run.estimate_rows.t_s, run.estimate_rows.pos_ned_m[:, 2])
     ground = float(np.median(stream.value[:LEAST_TESTED, 0])) if source == Sensor.BARO else case.ground_range_m
-    start = -float(np.interp(case.flight_s[0] - 1.0, run.said.t_s, run.said.pos_ned_m[:, 2]))
+    start = -float(np.interp(case.flight_s[0] - 1.0, run.estimate_rows.t_s, run.estimate_rows.pos_ned_m[:, 2]))
     return _capped((height - ground) - (ours - start), HEIGHT_FLOOR_M)
 
 
@@ -240,11 +240,11 @@ def _of_place(case: Case, streams: Streams, run: Replay, options: ReplayOptions)
         return 1.0
     inside = (place.t_s > case.flight_s[0]) & (place.t_s < case.flight_s[1])
     at_s = place.t_s[inside] - options.gps_delay_s
-    apart = place.value[inside, :2] - at(run.said.t_s, run.said.pos_ned_m[:, :2], at_s)
+    apart = place.value[inside, :2] - at(run.estimate_rows.t_s, run.estimate_rows.pos_ned_m[:, :2], at_s)
     moved = speed.value[(speed.t_s > case.flight_s[0]) & (speed.t_s < case.flight_s[1]), :2]
     other = at(
-        run.said.t_s,
-        run.said.vel_ned_m_s[:, :2],
+        run.estimate_rows.t_s,
+        run.estimate_rows.vel_ned_m_s[:, :2],
         speed.t_s[(speed.t_s > case.flight_s[0]) & (speed.t_s < case.flight_s[1])] - options.gps_delay_s,
     )
     level = np.hypot(*(apart - np.median(apart, axis=0)).T) if len(apart) else np.zeros(0)
@@ -259,6 +259,8 @@ def drift(case: Case, run: Replay | None, sign: Sign) -> float | None:
     inside = (t_s >= max(sign.window_s[0], case.flight_s[0])) & (t_s <= min(sign.window_s[1], case.flight_s[1]))
     if inside.sum() < 5:
         return None
-    ours = np.column_stack([np.interp(t_s[inside], run.said.t_s, run.said.pos_ned_m[:, axis]) for axis in range(2)])
+    ours = np.column_stack(
+        [np.interp(t_s[inside], run.estimate_rows.t_s, run.estimate_rows.pos_ned_m[:, axis]) for axis in range(2)]
+    )
     apart = case.own.pos_ned_m[inside, :2] - ours
     return float(np.hypot(*(apart - apart[0]).T).max())

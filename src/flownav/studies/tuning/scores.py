@@ -17,9 +17,9 @@ from flownav.core.errors import InputError
 from flownav.core.measurement import Array, Sensor
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
+from flownav.navigation.kernel_settings import flow_gain
 from flownav.navigation.rows import InnovationRow
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.told import flow_gain
 from flownav.replays.judged import TESTED
 from flownav.replays.prepare import FLOW, ReplayOptions
 from flownav.replays.session import Replay, replay_again
@@ -120,9 +120,9 @@ def as_reported(innovation: Array, settings: NavigatorSettingsFile) -> Array:
     row = InnovationRow.of(reported)
     for sensor, component in product(FLOW, range(2)):
         gain = flow_gain(component, sensor == Sensor.FLOW_RATE, settings.flow_gain_x, settings.flow_gain_y)
-        told = (row.sensor == sensor) & (row.component == component)
-        row.innovation[told] *= gain
-        row.innovation_variance[told] *= gain**2
+        of_row = (row.sensor == sensor) & (row.component == component)
+        row.innovation[of_row] *= gain
+        row.innovation_variance[of_row] *= gain**2
     return reported
 
 
@@ -211,10 +211,10 @@ def _truth_errors(flown: Replay, windows: Sequence[Window]) -> Array:
         return np.full(len(windows), np.nan)
     t_s, position = np.asarray(truth["t_s"], float), flown.truth_position
     moving = placed.turned(velocity_of(t_s, position))[:, :2]
-    found, said = [], flown.said
+    found, estimate_rows = [], flown.estimate_rows
     for t0, t1 in windows:
         inside = (t_s >= t0) & (t_s < t1) & np.isfinite(moving).all(axis=1)
-        error = difference_at(said.t_s, said.vel_ned_m_s[:, :2], t_s[inside], moving[inside])
+        error = difference_at(estimate_rows.t_s, estimate_rows.vel_ned_m_s[:, :2], t_s[inside], moving[inside])
         found.append(np.sqrt(np.mean(np.sum(error**2, axis=1))) if len(error) else np.nan)
     return np.array(found)
 

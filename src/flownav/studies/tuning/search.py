@@ -160,13 +160,13 @@ def search(trials: Trials, settings: NavigatorSettingsFile) -> Found:
     while True:
         best = _climb(trials, best, kept, steps, limits)
         tops = [_top(trials, best, k, limits[k]) if best[k] else None for k in range(len(limits))]
-        told = [k for k in kept if _moved(tops[k]) and _worth(trials, best, k) >= WORTH_NATS]
-        if len(told) == np.count_nonzero(best):
+        kept_knobs = [k for k in kept if _moved(tops[k]) and _worth(trials, best, k) >= WORTH_NATS]
+        if len(kept_knobs) == np.count_nonzero(best):
             return Found(
                 np.array([top.place if top else 0.0 for top in tops]), [top.interval if top else None for top in tops]
             )
-        best = np.where(np.isin(np.arange(len(limits)), told), best, 0.0)
-        kept, steps = told, STEPS[1:]
+        best = np.where(np.isin(np.arange(len(limits)), kept_knobs), best, 0.0)
+        kept, steps = kept_knobs, STEPS[1:]
 
 
 def _climb(

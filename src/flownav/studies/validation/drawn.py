@@ -21,7 +21,7 @@ from flownav.sensors.sheets import SensorSheets, shipped_sheets
 from flownav.simulation.dispersion import DispersionSection, drawn, uniforms
 from flownav.simulation.ensemble import SHEETS, with_numbers
 from flownav.simulation.noise import threefry
-from flownav.simulation.truth import CARRIED
+from flownav.simulation.truth import SENSOR_TABLE
 
 
 def rate_hz(stream: Stream) -> float:
@@ -147,9 +147,9 @@ def drawn_sheets(sheets: SensorSheets, flight: Flight) -> SensorSheets:
         source, _, key = name.partition(".")
         sheet = getattr(sheets, source) if source in SHEETS else None
         if sheet is not None:
-            told = _number_of(sheet, key)
+            stated = _number_of(sheet, key)
             draw = float(entry.frozen().ppf(flight.uniform(name)))
-            touched.setdefault(source, {})[key] = drawn(entry.mode, draw, told, 0.0, 0.0)
+            touched.setdefault(source, {})[key] = drawn(entry.mode, draw, stated, 0.0, 0.0)
     return sheets.model_copy(
         update={source: with_numbers(getattr(sheets, source), numbers, source) for source, numbers in touched.items()}
     )
@@ -173,7 +173,7 @@ def readings(
 
     drawn: the name of its draws; p: its coefficients; step: its equation, where the row's takes more than the sensor's.
     """
-    one = next(sensor for sensor in CARRIED if sensor.name == name)
+    one = next(sensor for sensor in SENSOR_TABLE if sensor.name == name)
     step, values, kept = step or one.step, [], {one.parameters: p}
     kept[one.unit] = lawful(one.draw, kept | {one.unit: one.unit(*normals_of(flight, f"{drawn} unit", one.unit))})
     if one.start is not None:

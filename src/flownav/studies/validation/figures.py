@@ -40,22 +40,26 @@ class Smoothed:
     rows: Array  # of `navigation.rows.EstimateRow`
 
     @property
-    def said(self) -> EstimateRow[Array]:
+    def estimate_rows(self) -> EstimateRow[Array]:
         """The columns."""
         return EstimateRow.of(self.rows)
 
     def velocity_frd(self, t_s: Array) -> Array:
         """(n, 3) body velocity [m/s]."""
-        return np.column_stack([np.interp(t_s, self.said.t_s, column) for column in self.said.vel_frd_m_s.T])
+        return np.column_stack(
+            [np.interp(t_s, self.estimate_rows.t_s, column) for column in self.estimate_rows.vel_frd_m_s.T]
+        )
 
     def height_m(self, t_s: Array) -> Array:
         """Over the ground [m]."""
-        return np.asarray(np.interp(t_s, self.said.t_s, ground_of(self.rows) - self.said.pos_ned_m[:, DOWN]))
+        return np.asarray(
+            np.interp(t_s, self.estimate_rows.t_s, ground_of(self.rows) - self.estimate_rows.pos_ned_m[:, DOWN])
+        )
 
     def tilt_cosine(self, t_s: Array) -> Array:
         """Cosine of the angle between body z and the vertical."""
-        rotation = rotation_of(self.said).as_matrix()
-        return np.asarray(np.interp(t_s, self.said.t_s, rotation[:, DOWN, DOWN]))
+        rotation = rotation_of(self.estimate_rows).as_matrix()
+        return np.asarray(np.interp(t_s, self.estimate_rows.t_s, rotation[:, DOWN, DOWN]))
 
 
 class FlowFit(NamedTuple):
@@ -185,7 +189,7 @@ def range_figures(log: Log, smoothed: Smoothed) -> dict[str, float]:
 
 def beyond_reach(t_s: Array, smoothed: Smoothed) -> dict[str, float]:
     """Readings a second where there is no echo, of a flight that goes there for LEAST_HIGH_S."""
-    rows_s = smoothed.said.t_s
+    rows_s = smoothed.estimate_rows.t_s
     high = smoothed.height_m(rows_s) > BEYOND_M
     high_s = float(np.sum(np.diff(rows_s)[high[1:]]))
     if high_s < LEAST_HIGH_S:
@@ -201,7 +205,9 @@ def barometer_figures(log: Log, smoothed: Smoothed) -> dict[str, float]:
     stream = log.streams.get(Sensor.BARO)
     if stream is None:
         return {}
-    off_m = stream.value[:, 0] - np.interp(stream.t_s, smoothed.said.t_s, -smoothed.said.pos_ned_m[:, DOWN])
+    off_m = stream.value[:, 0] - np.interp(
+        stream.t_s, smoothed.estimate_rows.t_s, -smoothed.estimate_rows.pos_ned_m[:, DOWN]
+    )
     window = max(int(BAROMETER_S * rate_hz(stream)), 1)
     if len(off_m) <= 2 * window:
         return {}

@@ -57,7 +57,7 @@ LACKS = (
 )  # fmt: skip
 
 
-def said(rows: Sequence[Row], verdict: str) -> list[str]:
+def sentences_of(rows: Sequence[Row], verdict: str) -> list[str]:
     """One sentence for each figure with this verdict: the numbers of every log where it holds."""
     sentences = []
     for figure in dict.fromkeys(row.figure for row in rows):
@@ -163,7 +163,7 @@ def page(rows: Sequence[Row], seed: int, count: int, bandwidth_hz: float) -> str
         ("Where it is too hard", TOO_HARD),
         ("Where it is different", OTHER),
     ):
-        sentences = said(rows, verdict)
+        sentences = sentences_of(rows, verdict)
         if sentences:
             text += f"\n## {title}\n\n" + "".join(f"- {sentence}\n" for sentence in sentences)
     lost = astray(rows)

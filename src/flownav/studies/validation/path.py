@@ -110,18 +110,18 @@ def path_of(flown: Replay, vehicle: AssumedVehicle) -> FlownPath:
     if flown.smoothed is None:
         raise ValueError("a smoothed replay is needed")
     rows = flown.smoothed[np.concatenate([np.diff(EstimateRow.of(flown.smoothed).t_s) > 0.0, [True]])]
-    said = EstimateRow.of(rows)
-    start, end = float(said.t_s[0]), float(said.t_s[-1])
+    row = EstimateRow.of(rows)
+    start, end = float(row.t_s[0]), float(row.t_s[-1])
     if end - start < LEAST_FLIGHT_S:
         raise InputError(
             f"{flown.log.path}: {end - start:.0f} s are too short; {LEAST_FLIGHT_S:g} s of flight are needed"
         )
-    ned = said.pos_ned_m.copy()
+    ned = row.pos_ned_m.copy()
     ned[:, DOWN] = np.minimum(ned[:, DOWN] - ground_of(rows), -LEAST_HEIGHT_M)
-    heading = np.unwrap(rotation_of(said).as_euler("ZYX")[:, 0])
+    heading = np.unwrap(rotation_of(row).as_euler("ZYX")[:, 0])
     grid_s = np.arange(start, end, 1.0 / GRID_HZ)
     sections = butter(4, vehicle.path_bandwidth_hz, fs=GRID_HZ, output="sos")
-    on_grid = np.column_stack([np.interp(grid_s, said.t_s, column) for column in (*ned.T, heading)])
+    on_grid = np.column_stack([np.interp(grid_s, row.t_s, column) for column in (*ned.T, heading)])
     smooth = sosfiltfilt(sections, on_grid, axis=0)[::KNOT_EVERY]
     knots_s = grid_s[::KNOT_EVERY]
     standing_m = float(-np.max(smooth[:, 2]))
@@ -134,9 +134,9 @@ def path_of(flown: Replay, vehicle: AssumedVehicle) -> FlownPath:
     )
 
 
-def rotation_of(said: EstimateRow[Array]) -> Rotation:
+def rotation_of(row: EstimateRow[Array]) -> Rotation:
     """The attitudes, body to earth."""
-    return Rotation.from_quat(said.quaternion[:, SCALAR_LAST])
+    return Rotation.from_quat(row.quaternion[:, SCALAR_LAST])
 
 
 def ground_of(rows: Array) -> Array:
@@ -159,9 +159,9 @@ def lean_of(log: Log, rows: Array) -> Lean:
         return Lean(0.0, 0.0, 0.0)
     instants_s = EstimateRow.of(rows).t_s
     t_s = np.arange(instants_s[0], instants_s[-1], 0.2)
-    said = EstimateRow.of(rows[np.clip(np.searchsorted(instants_s, t_s), 0, len(rows) - 1)])
-    attitude = rotation_of(said)
-    velocity = attitude.inv().apply(said.vel_ned_m_s)
+    row = EstimateRow.of(rows[np.clip(np.searchsorted(instants_s, t_s), 0, len(rows) - 1)])
+    attitude = rotation_of(row)
+    velocity = attitude.inv().apply(row.vel_ned_m_s)
     north, east = (attitude.inv().apply(axis) for axis in np.eye(3)[:2])
     summed = np.vstack([np.zeros(3), np.cumsum(imu.value[:, 3:6], axis=0)])
     first, last = np.searchsorted(imu.t_s, t_s - 0.1), np.searchsorted(imu.t_s, t_s + 0.1)

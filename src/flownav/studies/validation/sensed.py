@@ -178,8 +178,8 @@ def _ranger(scene: Scene) -> list[Stream]:
     assert sheet is not None
     seen = [{BeamHit: hit} for hit in hits_of(scene.path, scene.instants_s(stream, sheet, "ranger"))]
     values = np.array(readings(scene.flight, "range_sensor", "ranger", sheet.parameters(), seen))
-    heard = (values[:, 1] > 0.0) & (values[:, 2] > 0.5)
-    return [Stream.of(Sensor.RANGE, stream.t_s[heard], values[heard, :1])]
+    valid = (values[:, 1] > 0.0) & (values[:, 2] > 0.5)
+    return [Stream.of(Sensor.RANGE, stream.t_s[valid], values[valid, :1])]
 
 
 def hits_of(path: FlownPath, t_s: Array) -> list[BeamHit]:

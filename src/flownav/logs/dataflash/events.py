@@ -81,9 +81,9 @@ def _source_sets(log: DataFlash) -> Iterator[Happened]:
             if event in SOURCES_BY_EVENT:
                 yield Happened(at_s, SOURCE_SET, f"source set {SOURCES_BY_EVENT[event]:.0f}", SOURCES_BY_EVENT[event])
         return
-    said = message_rows(log, "XKFS", (Field("SS", 0, 2),))
-    if said is not None:
-        yield from changes(SOURCE_SET, said.t_s, said.columns["SS"] + 1.0, "source set {}".format)
+    sets_stated = message_rows(log, "XKFS", (Field("SS", 0, 2),))
+    if sets_stated is not None:
+        yield from changes(SOURCE_SET, sets_stated.t_s, sets_stated.columns["SS"] + 1.0, "source set {}".format)
 
 
 def _clipping(log: DataFlash) -> Iterator[Happened]:

@@ -13,7 +13,7 @@ from numba.core.datamodel.registry import default_manager
 
 from flownav.core.compile import LANES, ONE_LANE, equation, kernel, procedure
 from flownav.core.compiling.loops import has_loop, jumps_back
-from flownav.core.compiling.remembered import remembering
+from flownav.core.compiling.memo import memoising
 
 
 class Inside(NamedTuple):
@@ -154,6 +154,6 @@ def test_laws_serve_one_lane_and_many_in_any_order(builds):
 def test_a_remembered_hash_is_the_types_own():
     kinds = [numba.typeof(TOLD), numba.float64, numba.typeof((1, 2.0)), numba.typeof(TOLD.table)]
     own = [hash(kind) for kind in kinds]
-    with remembering():
+    with memoising():
         assert [hash(kind) for kind in kinds] == own == [hash(kind) for kind in kinds]
         assert hash(numba.types.Tuple((numba.int64, numba.float64))) == own[2]

@@ -19,7 +19,7 @@ PX4_MAIN = {1: "Manual", 2: "Altitude", 3: "Position", 5: "Acro", 6: "Offboard",
 PX4_AUTO, PX4_SUB = 4, {2: "Takeoff", 3: "Hold", 4: "Mission", 5: "Return", 6: "Land", 8: "Follow", 9: "Precision land"}
 
 
-class Said:
+class VehicleEvents:
     """The reports of one autopilot so far. parameters: as last received, by name."""
 
     def __init__(self, make: int) -> None:

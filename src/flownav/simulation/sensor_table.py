@@ -36,8 +36,8 @@ from flownav.sensors.range_sensor import (
 from flownav.sensors.sheet import SensorSheet
 from flownav.sensors.sheets import GpsReceiverSheet, InertialSheet
 from flownav.sensors.skid_switch import SkidSwitchReading, SkidSwitchSheet, draw_skid_switch, start_skid_switch
-from flownav.simulation import onboard, seeing
-from flownav.simulation.seeing import told
+from flownav.simulation import onboard, views
+from flownav.simulation.views import reads
 
 if TYPE_CHECKING:
     from flownav.vehicle.kinds import AnyVehicle, RotorFacts
@@ -53,7 +53,7 @@ class Channels(NamedTuple):
     fault: int
 
 
-class Said(NamedTuple):
+class Output(NamedTuple):
     """One of the readings that a sensor gives at a time. say: makes it of what was read; None: the step does."""
 
     kind: Sensor
@@ -68,7 +68,7 @@ class Carrier(NamedTuple):
     field: MagneticField
 
 
-class CarriedSensor(NamedTuple):
+class SensorRow(NamedTuple):
     """One sensor. Its records are those that its laws are annotated with.
 
     draw(n: Unit, p: Parameters) -> Unit; start(n: normals, p, ...) -> State, None where it has no state; step(state,
@@ -80,7 +80,7 @@ class CarriedSensor(NamedTuple):
 
     name: str  # of its datasheet: in scenarios, dispersions, records and the names of its noise
     sheet: type[SensorSheet]
-    says: tuple[Said, ...]
+    says: tuple[Output, ...]
     draw: Callable[..., Any]
     start: Callable[..., Any] | None
     step: Callable[..., Any]
@@ -89,7 +89,7 @@ class CarriedSensor(NamedTuple):
     phase: int = 0
     late: bool = False
     lever: str = ""
-    heard: Callable[..., Any] | None = None
+    after_reading: Callable[..., Any] | None = None
     wanted: Callable[[onboard.Wishes, Any, float], Any] = onboard.as_filed
     readings: Callable[[onboard.Wishes], int] | None = None  # how many of `says` it gives; None: all
     coefficients: Callable[[Any, Carrier], Any] = lambda sheet, _: sheet.parameters()
@@ -125,72 +125,72 @@ class CarriedSensor(NamedTuple):
         return self.says[0].kind != Sensor.IMU
 
 
-_table: list[CarriedSensor] = [
-    CarriedSensor(
+_table: list[SensorRow] = [
+    SensorRow(
         "gps_receiver", GpsReceiverSheet,
-        (Said(Sensor.GPS_POSITION, told(
+        (Output(Sensor.GPS_POSITION, reads(
             GpsReceiverReading, ("pos_n_m", "pos_e_m", "pos_d_m"),
             ("horizontal_variance_m2", "horizontal_variance_m2", "vertical_variance_m2"))),
-         Said(Sensor.GPS_VELOCITY, told(
+         Output(Sensor.GPS_VELOCITY, reads(
              GpsReceiverReading, ("vel_n_m_s", "vel_e_m_s", "vel_d_m_s"), ("speed_variance_m2_s2",) * 3))),
-        draw_gps_receiver, start_gps_receiver, step_gps_receiver, (seeing.see_motion,), Channels(110, 175, 150),
+        draw_gps_receiver, start_gps_receiver, step_gps_receiver, (views.see_motion,), Channels(110, 175, 150),
         phase=1, late=True, wanted=onboard.receiver_sheet, readings=onboard.receiver_readings,
     ),
-    CarriedSensor(
-        "barometer", BarometerSheet, (Said(Sensor.BARO, told(BarometerReading, ("alt_m",))),),
-        draw_barometer, start_barometer, step_barometer, (seeing.see_altitude,), Channels(136, 192, 156), phase=1,
+    SensorRow(
+        "barometer", BarometerSheet, (Output(Sensor.BARO, reads(BarometerReading, ("alt_m",))),),
+        draw_barometer, start_barometer, step_barometer, (views.see_altitude,), Channels(136, 192, 156), phase=1,
         coefficients=lambda sheet, on: sheet.parameters(on.rotor.radius_m, on.vehicle.air_density_kg_m3),
     ),
-    CarriedSensor(
+    SensorRow(
         "magnetometer", MagnetometerSheet,
-        (Said(Sensor.MAG, told(MagnetometerReading, ("mag_x_gauss", "mag_y_gauss", "mag_z_gauss"))),),
-        draw_magnetometer, None, read_magnetometer, (seeing.see_power,), Channels(138, 196, 159),
+        (Output(Sensor.MAG, reads(MagnetometerReading, ("mag_x_gauss", "mag_y_gauss", "mag_z_gauss"))),),
+        draw_magnetometer, None, read_magnetometer, (views.see_power,), Channels(138, 196, 159),
         coefficients=lambda sheet, on: sheet.parameters(on.field),
     ),
-    CarriedSensor(
-        "range_sensor", RangeSensorSheet, (Said(Sensor.RANGE, told(RangeSensorReading, ("range_m",))),),
-        draw_range_sensor, start_range_sensor, step_range_sensor, (seeing.see_beam,), Channels(130, 190, 162),
+    SensorRow(
+        "range_sensor", RangeSensorSheet, (Output(Sensor.RANGE, reads(RangeSensorReading, ("range_m",))),),
+        draw_range_sensor, start_range_sensor, step_range_sensor, (views.see_beam,), Channels(130, 190, 162),
         phase=2, late=True, lever="lens", wanted=onboard.range_sheet,
     ),
-    CarriedSensor(
-        "flow_camera", FlowCameraSheet, (Said(Sensor.FLOW_RATE, None),),
-        draw_flow_camera, start_flow_camera, seeing.look, (seeing.mean_rates, seeing.see_flow),
+    SensorRow(
+        "flow_camera", FlowCameraSheet, (Output(Sensor.FLOW_RATE, None),),
+        draw_flow_camera, start_flow_camera, views.look, (views.mean_rates, views.see_flow),
         Channels(120, 183, 165), phase=1, late=True, lever="lens", wanted=onboard.camera_sheet,
     ),
-    CarriedSensor(
+    SensorRow(
         "pad_camera", PadCameraSheet,
-        (Said(Sensor.PAD, told(PadCameraReading, ("tan_forward", "tan_right", "distance_m"),
+        (Output(Sensor.PAD, reads(PadCameraReading, ("tan_forward", "tan_right", "distance_m"),
                                ("forward_variance", "right_variance", "distance_variance_m2"))),),
-        draw_pad_camera, None, seeing.look_for_pad, (seeing.see_pad,), Channels(142, 205, 168),
-        phase=3, late=True, lever="lens", heard=seeing.note_seen, wanted=onboard.pad_sheet,
+        draw_pad_camera, None, views.look_for_pad, (views.see_pad,), Channels(142, 205, 168),
+        phase=3, late=True, lever="lens", after_reading=views.note_seen, wanted=onboard.pad_sheet,
     ),
-    CarriedSensor(
-        "skid_switch", SkidSwitchSheet, (Said(Sensor.LANDED, told(SkidSwitchReading, ("landed",))),),
-        draw_skid_switch, start_skid_switch, seeing.touch, (seeing.see_load,), Channels(148, 208, 171),
+    SensorRow(
+        "skid_switch", SkidSwitchSheet, (Output(Sensor.LANDED, reads(SkidSwitchReading, ("landed",))),),
+        draw_skid_switch, start_skid_switch, views.touch, (views.see_load,), Channels(148, 208, 171),
         coefficients=lambda sheet, on: sheet.parameters(on.vehicle.mass_kg * on.vehicle.gravity_m_s2),
     ),
-    CarriedSensor(
+    SensorRow(
         "inertial", InertialSheet,
-        (Said(Sensor.IMU, told(InertialReading, (
+        (Output(Sensor.IMU, reads(InertialReading, (
             "gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s", "accel_x_m_s2", "accel_y_m_s2", "accel_z_m_s2"))),),
-        draw_inertial, start_inertial, seeing.feel_motion, (), Channels(40, 160, 174), wanted=onboard.inertial_sheet,
+        draw_inertial, start_inertial, views.feel_motion, (), Channels(40, 160, 174), wanted=onboard.inertial_sheet,
         coefficients=lambda sheet, on: sheet.parameters(on.rotor.speed_rad_s, BLADES),
     ),
 ]  # fmt: skip
-_fixed: list[tuple[CarriedSensor, ...]] = []
+_fixed: list[tuple[SensorRow, ...]] = []
 
 
-def carry(sensor: CarriedSensor) -> None:
+def carry(sensor: SensorRow) -> None:
     """Add a sensor to every vehicle, read after the others; before anything of the simulator is imported."""
     if _fixed:
         raise RuntimeError(f"{sensor.name}: what vehicles carry is known once the simulator is imported")
-    says = [said.say for said in sensor.says]
-    laws = [law for law in (sensor.draw, sensor.start, sensor.step, *sensor.see, sensor.heard, *says) if law]
+    says = [output.say for output in sensor.says]
+    laws = [law for law in (sensor.draw, sensor.start, sensor.step, *sensor.see, sensor.after_reading, *says) if law]
     depends_also(__name__, laws, f"{sensor.name} {sensor.channels} {sensor.late} {sensor.lever}")
     _table.append(sensor)
 
 
-def carried_sensors() -> tuple[CarriedSensor, ...]:
+def sensor_rows() -> tuple[SensorRow, ...]:
     """Every carried sensor, in the order in which those that are due in one epoch read."""
     if not _fixed:
         _fixed.append(tuple(_table))

@@ -73,9 +73,9 @@ def failed(read: Reading, earlier: Reading, held: float, since_s: float, n: Faul
 
     earlier: its reading `f.late_readings` before; held: its first value before the fault.
     """
-    said = earlier if f.late_readings > 0.0 else read
-    x = f.m_xx * said.value_0 + f.m_xy * said.value_1 + f.bias_0 + f.drift_0 * since_s + f.noise_first * n.first
-    y = f.m_yx * said.value_0 + f.m_yy * said.value_1 + f.bias_1 + f.drift_1 * since_s + f.noise_first * n.second
+    source = earlier if f.late_readings > 0.0 else read
+    x = f.m_xx * source.value_0 + f.m_xy * source.value_1 + f.bias_0 + f.drift_0 * since_s + f.noise_first * n.first
+    y = f.m_yx * source.value_0 + f.m_yy * source.value_1 + f.bias_1 + f.drift_1 * since_s + f.noise_first * n.second
     x = f.even_to * (2.0 * even(n.first) - 1.0) if f.even_to > 0.0 else x
     y = f.even_to * (2.0 * even(n.second) - 1.0) if f.even_to > 0.0 else y
     spike = f.spike_share > 0.0 and even(n.third) < f.spike_share
@@ -87,10 +87,10 @@ def failed(read: Reading, earlier: Reading, held: float, since_s: float, n: Faul
     return Reading(
         x + gone,
         y + gone,
-        said.value_2 + f.bias_2 + gone,
-        said.value_3 + f.bias_3 + f.noise_last * n.fourth + gone,
-        said.value_4 + f.bias_4 + f.noise_last * n.fifth + gone,
-        said.value_5 + f.bias_5 + f.noise_last * n.sixth + gone,
+        source.value_2 + f.bias_2 + gone,
+        source.value_3 + f.bias_3 + f.noise_last * n.fourth + gone,
+        source.value_4 + f.bias_4 + f.noise_last * n.fifth + gone,
+        source.value_5 + f.bias_5 + f.noise_last * n.sixth + gone,
         read.variance_0,
         read.variance_1,
         read.variance_2,

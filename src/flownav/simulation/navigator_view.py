@@ -12,7 +12,7 @@ from flownav.simulation.layout import PLANT
 from flownav.simulation.records import Spread
 
 
-class PadSaid(NamedTuple):
+class PadEstimate(NamedTuple):
     """Where the pad is, NED; known above 0 where it has been seen or stood upon."""
 
     known: float
@@ -20,7 +20,7 @@ class PadSaid(NamedTuple):
     east_m: float
 
 
-class GroundSaid(NamedTuple):
+class GroundEstimate(NamedTuple):
     """Where the ground below is."""
 
     down_m: float
@@ -69,8 +69,8 @@ def of_pad(nav: Work, lanes: Lanes, axis: int, lane: int) -> float:
 
 
 _NAVIGATOR = Layout(below=MEMORY)
-_NAVIGATOR.name(PadSaid, PAD_KNOWN, STATE + PAD, STATE + PAD + 1)
-_NAVIGATOR.name(GroundSaid, STATE + GROUND)
+_NAVIGATOR.name(PadEstimate, PAD_KNOWN, STATE + PAD, STATE + PAD + 1)
+_NAVIGATOR.name(GroundEstimate, STATE + GROUND)
 _NAVIGATOR.derive(StatedVariance, stated_variance)
 _NAVIGATOR.derive(PadVariance, pad_variance)
 

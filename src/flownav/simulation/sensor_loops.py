@@ -6,22 +6,22 @@ from typing import Any, NamedTuple, get_type_hints
 
 from flownav.core.compile import Lanes, Layout, OnLanes, Work, equation, procedure, write_function
 from flownav.simulation.block import draw
-from flownav.simulation.carried import CarriedSensor
-from flownav.simulation.failing import Taken, strike
+from flownav.simulation.fault_injection import Taken, strike
 from flownav.simulation.layout import AS_IS, BEGUN, CARRIERS, NORMALS, STATE, UNIT, in_pairs, put_slot
 from flownav.simulation.onboard import EPOCH_S, Clock, Fitting, Place
 from flownav.simulation.records import Late
-from flownav.simulation.truth import CARRIED, LATE
+from flownav.simulation.sensor_table import SensorRow
+from flownav.simulation.truth import LATE, SENSOR_TABLE
 
 
-class Carriage(NamedTuple):
+class SensorLoops(NamedTuple):
     """A sensor's loops over lanes; start and heard are None where it has none."""
 
-    sensor: CarriedSensor
+    sensor: SensorRow
     draw: OnLanes[..., Any]
     start: OnLanes[..., Any] | None
     read: OnLanes[..., Any]
-    heard: OnLanes[..., Any] | None
+    after_reading: OnLanes[..., Any] | None
 
 
 @equation
@@ -30,15 +30,15 @@ def punctual(work: Work, lanes: Lanes, lane: int) -> Late:
     return Late(0.0)
 
 
-def carriage_of(sensor: CarriedSensor) -> Carriage:
+def loops_of(sensor: SensorRow) -> SensorLoops:
     """The loops of one sensor. TypeError where a law of its row takes what is no record."""
     own, before = records_of(sensor, starting=False), records_of(sensor, starting=True)
     start = before.loop(sensor.start) if sensor.start else None
-    heard = own.loop(sensor.heard) if sensor.heard else None
-    return Carriage(sensor, before.loop(sensor.draw), start, own.loop(sensor.step), heard)
+    after_reading = own.loop(sensor.after_reading) if sensor.after_reading else None
+    return SensorLoops(sensor, before.loop(sensor.draw), start, own.loop(sensor.step), after_reading)
 
 
-def records_of(sensor: CarriedSensor, *, starting: bool) -> Layout:
+def records_of(sensor: SensorRow, *, starting: bool) -> Layout:
     """The plant's records and the sensor's own. Before it is drawn, the rows of its unit hold the normals of it."""
     own = Layout(below=CARRIERS)
     named = [(sensor.parameters, AS_IS), (sensor.unit, UNIT), (sensor.state, STATE)]
@@ -50,39 +50,39 @@ def records_of(sensor: CarriedSensor, *, starting: bool) -> Layout:
         own.derive(Late, punctual)
     elif sensor.late:
         own.name(Late, AS_IS["late"] + LATE.index(sensor.name))
-    own.derive(Fitting, _carried_as(sensor.name, ""), "s")
-    own.derive(Place, _carried_as(sensor.name, ".place"), "s")
+    own.derive(Fitting, _fitting_as(sensor.name, ""), "s")
+    own.derive(Place, _fitting_as(sensor.name, ".place"), "s")
     for law in sensor.see:
         own.see(law)
     if sensor.says[0].say is not None:
-        own.sink(get_type_hints(sensor.says[0].say)["read"], *_teller(sensor))
+        own.sink(get_type_hints(sensor.says[0].say)["read"], *_writer(sensor))
     return own
 
 
-def _carried_as(name: str, part: str) -> Callable[..., Any]:
+def _fitting_as(name: str, part: str) -> Callable[..., Any]:
     """`found(work, lanes, s, lane)`: how the sensor is carried, or a part of that."""
     source = f"def found(work, lanes, s, lane):\n    return s.carried.{name}{part}\n"
     return equation(write_function("found", source, {}))
 
 
-def _teller(sensor: CarriedSensor) -> tuple[Any, ...]:
+def _writer(sensor: SensorRow) -> tuple[Any, ...]:
     """`tell(work, lanes, lane, read, *needs)` and its needs: each reading that the vehicle has of this into a slot."""
     scope: dict[str, Any] = {"put_slot": put_slot}
     needs = ("slot", "slots", "s") if len(sensor.says) > 1 else ("slot",)
     lines = [f"def tell(work, lanes, lane, read, {', '.join(needs)}):"]
-    for k, said in enumerate(sensor.says):
-        scope[f"say{k}"] = said.say
-        place, told = f"(slot + {k}) % slots" if k else "slot", f"say{k}(read)"
+    for k, output in enumerate(sensor.says):
+        scope[f"say{k}"] = output.say
+        place, call = f"(slot + {k}) % slots" if k else "slot", f"say{k}(read)"
         if k:
             lines.append(f"    if s.carried.{sensor.name}.clock.fitted > {k}:")
-        lines.append(f"    {'    ' * (k > 0)}put_slot(work, lanes, {place}, lane, {told})")
+        lines.append(f"    {'    ' * (k > 0)}put_slot(work, lanes, {place}, lane, {call})")
     return equation(write_function("tell", "\n".join(lines) + "\n", scope)), *needs
 
 
-CARRIAGES = {sensor.name: carriage_of(sensor) for sensor in CARRIED}
+SENSOR_LOOPS = {sensor.name: loops_of(sensor) for sensor in SENSOR_TABLE}
 
 
-INERTIAL_FAULT = CARRIAGES["inertial"].sensor.channels.fault  # of the first reading of an epoch
+INERTIAL_FAULT = SENSOR_LOOPS["inertial"].sensor.channels.fault  # of the first reading of an epoch
 
 
 @equation
@@ -102,16 +102,16 @@ def called(run: OnLanes[..., Any]) -> str:
     return ", ".join(inspect.signature(run).parameters)
 
 
-def drawn(one: Carriage, channel: str) -> str:
+def drawn(one: SensorLoops, channel: str) -> str:
     """The line that draws the normals of a reading."""
     row, count = NORMALS[one.sensor.name], in_pairs(one.sensor.normals)
     return f"draw(work, lanes, {row}, {count}, seed, flight, epoch, {channel})"
 
 
-def turn(number: int, one: Carriage, scope: dict[str, Any]) -> list[str]:
+def turn(number: int, one: SensorLoops, scope: dict[str, Any]) -> list[str]:
     """The lines of one sensor's turn in an epoch."""
-    sensor, read, heard = one.sensor, f"read_{number}", f"heard_{number}"
-    scope |= {read: one.read, heard: one.heard}
+    sensor, read, after_reading = one.sensor, f"read_{number}", f"after_{number}"
+    scope |= {read: one.read, after_reading: one.after_reading}
     lines = [
         f"clock = s.carried.{sensor.name}.clock",
         "if due(clock, epoch):",
@@ -120,26 +120,26 @@ def turn(number: int, one: Carriage, scope: dict[str, Any]) -> list[str]:
         f"    {read}({called(one.read)})",
         "    if fails is not None:",
     ]
-    for k, said in enumerate(sensor.says):
+    for k, output in enumerate(sensor.says):
         place, channel = f"(taken + {k}) % slots" if k else "slot", sensor.channels.fault + 3 * k
-        reading = f"taken_now(epoch, {place}, {int(said.kind)}, {channel}, clock)"
+        reading = f"taken_now(epoch, {place}, {int(output.kind)}, {channel}, clock)"
         strikes = f"strike(work, lanes, seed, flight, {reading})"
         lines += [f"        if clock.fitted > {k}:", f"            {strikes}"] if k else [f"        {strikes}"]
-    lines += [f"    {heard}({called(one.heard)})"] if one.heard else []
+    lines += [f"    {after_reading}({called(one.after_reading)})"] if one.after_reading else []
     return [*lines, "    taken += clock.fitted"]
 
 
 def _sample() -> Callable[..., Any]:
     scope: dict[str, Any] = {"due": due, "draw": draw, "strike": strike, "taken_now": taken_now}
     lines = ["def sample(work, lanes, seed, flight, epoch, slots, taken, s, fails):"]
-    for number, one in enumerate(CARRIAGES.values()):
+    for number, one in enumerate(SENSOR_LOOPS.values()):
         if one.sensor.on_epochs:
             lines += [f"    {line}" for line in turn(number, one, scope)]
     return procedure(write_function("sample", "\n".join([*lines, "    return taken"]) + "\n", scope))
 
 
 def _read_inertial() -> Callable[..., Any]:
-    one = CARRIAGES["inertial"]
+    one = SENSOR_LOOPS["inertial"]
     scope: dict[str, Any] = {"draw": draw, "read": one.read}
     lines = [
         "def read_inertial(work, lanes, seed, flight, epoch, part, slot, s):",
@@ -158,7 +158,7 @@ read_inertial = _read_inertial()
 
 def _draw_units() -> Callable[..., Any]:
     lines = ["def draw_units(work, lanes, seed, flight, step):"]
-    for sensor in (one.sensor for one in CARRIAGES.values()):
+    for sensor in (one.sensor for one in SENSOR_LOOPS.values()):
         for record, row, when in ((sensor.unit, UNIT, "step"), (sensor.begun, BEGUN, "step + 1")):
             if record is not None:
                 drawn = f"{row[sensor.name]}, {in_pairs(record)}, seed, flight, {when}, {sensor.channels.start}"
@@ -168,7 +168,7 @@ def _draw_units() -> Callable[..., Any]:
 
 def _start_onboard() -> Callable[..., Any]:
     lines, scope = ["def start_onboard(work, lanes, s):"], dict[str, Any]()
-    for number, one in enumerate(CARRIAGES.values()):
+    for number, one in enumerate(SENSOR_LOOPS.values()):
         for run, name in ((one.draw, f"draw_{number}"), (one.start, f"start_{number}")):
             if run is not None:
                 scope[name] = run

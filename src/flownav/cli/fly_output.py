@@ -28,8 +28,8 @@ def show(facts: dict[str, Any], manifest: Mapping[str, Any], median: int) -> Non
     """How it ended, errors per state beside the paper's table, touchdown, files."""
     many, paper, white = facts["flights"] > 1, manifest.get("paper"), facts["gps"] == "white"
     wide, digits = (WIDEST if many and paper else WIDE), 3 if many else 4
-    told = sentence(manifest, facts)
-    say(*([told] if told else []), title(facts))
+    first_line = sentence(manifest, facts)
+    say(*([first_line] if first_line else []), title(facts))
     named = (f"{name} (5-95 %)" if many and name in RANGED else name for name in STATISTICS)
     heads = ["error in flight", *named, *(f"paper\n{statistic}" for statistic in PRINTED if paper)]
     errors = table(heads, left=1, fixed=1, **plain_look(edge=False))
@@ -97,56 +97,56 @@ def takeoff_lines(takeoff: dict[str, Any], flights: int) -> list[str]:
 
 def touchdown_lines(landing: dict[str, Any], landed: int | None, flights: int) -> list[str]:
     """The touchdown of one flight or of many, a sentence a line."""
-    said = _one_lines(landing) if landed is None else _many_lines(landing, flights)
-    return [*said, *([] if landed is None else _landed_lines(landing, landed, flights))]
+    lines = _one_lines(landing) if landed is None else _many_lines(landing, flights)
+    return [*lines, *([] if landed is None else _landed_lines(landing, landed, flights))]
 
 
 def _one_lines(landing: dict[str, Any]) -> list[str]:
     """The touchdown of one flight; the rest of its figures is in the report."""
     contact, rest, limited = (landing[name] or {} for name in ("contact", "rest", "limited_by"))
-    said = []
+    lines = []
     if contact.get("distance_m") is not None:
         moves = [f"{words} {contact[key]:.2f} {unit}" for key, words, unit in MOTIONS[:2]]
-        said.append(f"touchdown  {contact['distance_m']:.3f} m off at {contact['t_s']:.2f} s, {', '.join(moves)}")
+        lines.append(f"touchdown  {contact['distance_m']:.3f} m off at {contact['t_s']:.2f} s, {', '.join(moves)}")
     if rest.get("distance_m") is not None:
         parts = [f"{words} {figure(limited.get(f'{name}_m'), '.3f')}" for name, words in PARTS.items()]
-        said.append(f"at rest  {rest['distance_m']:.3f} m off: {', '.join(parts)} m")
-    return said
+        lines.append(f"at rest  {rest['distance_m']:.3f} m off: {', '.join(parts)} m")
+    return lines
 
 
 def _many_lines(landing: dict[str, Any], flights: int) -> list[str]:
     """The touchdowns of many flights."""
-    said = []
+    lines = []
     for name, group in (("touchdown", landing["contact"]), ("at rest", landing["rest"])):
         if group is None or group["distance_m"] is None:
             continue
         parts = [f"{_cell(group['distance_m'], 3)} m from the pad's centre, at {_cell(group['t_s'], 2)} s"]
         parts += [f"{words} {_cell(group[key], 3)} {unit}" for key, words, unit in MOTIONS if key in group]
-        said.append(f"{name}  {', '.join(parts)}")
+        lines.append(f"{name}  {', '.join(parts)}")
         if flights < FLIGHTS_FOR_R95:
-            said.append(f"95 % of the flights, {name}  needs {FLIGHTS_FOR_R95} flights")
+            lines.append(f"95 % of the flights, {name}  needs {FLIGHTS_FOR_R95} flights")
         elif group.get("r95_m") is not None:
             ends = interval_words(*group["r95_interval_m"])
-            said.append(f"95 % of the flights, {name}  within {group['r95_m']:.3f} m (95 % interval {ends})")
+            lines.append(f"95 % of the flights, {name}  within {group['r95_m']:.3f} m (95 % interval {ends})")
     limited = landing["limited_by"]
     if limited is not None:
         parts = [f"{words} {figure(limited[f'{name}_m'], '.3f')} m" for name, words in PARTS.items()]
-        said.append(f"of the distance, in 95 % of the flights at most  {', '.join(parts)}")
-    return said
+        lines.append(f"of the distance, in 95 % of the flights at most  {', '.join(parts)}")
+    return lines
 
 
 def _landed_lines(landing: dict[str, Any], landed: int, flights: int) -> list[str]:
     """Number of landings, and the outcomes of the other flights."""
     rate, around = landing["success"], landing["went_around"]
     share = f"(95 % interval {100.0 * rate['low']:.1f}..{100.0 * rate['high']:.1f} %)"
-    said = [f"landed  {landed} of {flights} flights, {100.0 * rate['rate']:.1f} % {share}"]
+    lines = [f"landed  {landed} of {flights} flights, {100.0 * rate['rate']:.1f} % {share}"]
     late = [f"{name} {count}" for name, count in landing["unfinished"].items() if count]
-    said += [f"not landed in time  {', '.join(late)}"] if late else []
+    lines += [f"not landed in time  {', '.join(late)}"] if late else []
     if around["flights"]:
-        said.append(f"went around  {around['flights']}, of which {around['landed']} landed after all")
+        lines.append(f"went around  {around['flights']}, of which {around['landed']} landed after all")
     if landing["broken"]:
-        said.append("crashes by  " + ", ".join(f"{name} {count}" for name, count in landing["broken"].items()))
-    return said
+        lines.append("crashes by  " + ", ".join(f"{name} {count}" for name, count in landing["broken"].items()))
+    return lines
 
 
 def _consistency_lines(facts: dict[str, Any]) -> list[str]:
@@ -155,12 +155,12 @@ def _consistency_lines(facts: dict[str, Any]) -> list[str]:
         ", ".join(f"{state} {figure(ratio)}" for state, ratio in facts[key].items())
         for key in ("rmse_over_bound", "error_over_stated")
     )
-    said = [f"RMSE over the bound of the filter's own model, in flight  {bound}"]
-    said.append(f"RMS of the error over what is stated of it  {stated}")
+    lines = [f"RMSE over the bound of the filter's own model, in flight  {bound}"]
+    lines.append(f"RMS of the error over what is stated of it  {stated}")
     inside = facts["anees_inside_fraction"]
     if inside is not None:
-        said.append(f"ANEES inside its 95 % band  on {100.0 * inside:.1f} % of the steps in flight")
-    return said
+        lines.append(f"ANEES inside its 95 % band  on {100.0 * inside:.1f} % of the steps in flight")
+    return lines
 
 
 def _pad_frames(bands: list[dict[str, Any]]) -> Any:
@@ -168,8 +168,8 @@ def _pad_frames(bands: list[dict[str, Any]]) -> Any:
     same frames.
     """
 
-    def beside(row: dict[str, Any], said: str, told: str, scale: float) -> str:
-        return f"{figure(row[said], scale=scale)} ({figure(row[told], scale=scale)})"
+    def beside(row: dict[str, Any], key: str, expected_key: str, scale: float) -> str:
+        return f"{figure(row[key], scale=scale)} ({figure(row[expected_key], scale=scale)})"
 
     heads = ("height [m]", "frames", "in view", "found", "wrong", "angle rms [mrad]", "distance rms [%]")
     rows = (

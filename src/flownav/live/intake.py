@@ -5,7 +5,7 @@ from collections import Counter, deque
 from flownav.core.frames import Vector
 from flownav.core.measurement import Measurement, Sensor
 from flownav.live.field import Field
-from flownav.live.filtering import FLOW, handed_over
+from flownav.live.filtering import FLOW, given_of
 from flownav.live.horizon import LATE, Lags, Serving, Source, Sources
 from flownav.live.inertial import Inertial
 from flownav.live.options import Options
@@ -34,7 +34,7 @@ MEASURED_MARGIN_S = 0.02  # beyond a measured lag; batches of 0.2 s lose nothing
 NAN = float("nan")
 
 
-class Hearing:
+class Intake:
     """Messages in, readings that wait out (`rings`).
 
     counts: by sensor and reason, readings that were dropped. readings, heard_s (our clock) and latest: by sensor, what
@@ -47,10 +47,10 @@ class Hearing:
         self.serving, self.origin = Serving(), Origin()
         self.counts: Counter[str] = Counter()
         self.readings: Counter[Sensor] = Counter()
-        self.heard_s: dict[Sensor, float] = {}
+        self.received_s: dict[Sensor, float] = {}
         self.latest: dict[Sensor, Measurement] = {}
         self.newest_s = self.since_s = NAN
-        self.gps_heard = self.flow_came = False
+        self.gps_received = self.flow_arrived = False
         self.flow_waited = 0  # flow readings that shared their estimate with a later one
         self._flow_s = NAN  # the vehicle's time of the last flow reading
         self.repeats, self.inertial, self.field, self.walking = Repeats(), Inertial(), Field(), Walking()
@@ -69,7 +69,7 @@ class Hearing:
         self.sources.barred.clear()
         self._unbiased_s.clear()
         self.newest_s = self.since_s = NAN
-        self.gps_heard = False
+        self.gps_received = False
 
     @property
     def horizon_s(self) -> float:
@@ -163,7 +163,7 @@ class Hearing:
         source's are put in their place.
         """
         barred = self.sources.barred.get(Sensor.IMU, set())
-        swap = self.inertial.heard(source, reading, self.sources.chosen(Sensor.IMU), barred)
+        swap = self.inertial.received(source, reading, self.sources.chosen(Sensor.IMU), barred)
         alone = not self.sources.alive(Sensor.IMU, reading.t_s)
         if source in barred and self.inertial.recovered(source, reading.t_s, alone=alone):
             barred.discard(source)
@@ -181,7 +181,7 @@ class Hearing:
         place = fix_deg_m(message)
         if message.fix_type < LEAST_FIX or place is None:
             return
-        self.gps_heard = True
+        self.gps_received = True
         if self.origin.fixed(place, here_ned_m) == "refused":
             self.counts["origin: refused"] += 1
 
@@ -193,18 +193,18 @@ class Hearing:
             reading, exposure_s = self._exposed(reading)
         instant_s = reading.t_s - reading.delay_s
         if reading.sensor != Sensor.LANDED:
-            self.lags.heard(reading.sensor, instant_s)
-        said = self.rings.take(handed_over(reading, exposure_s, self._options.identified))
-        if said != waiting.TAKEN:
-            why = LATE if said == waiting.LATE else "overflow"
+            self.lags.received(reading.sensor, instant_s)
+        status = self.rings.take(given_of(reading, exposure_s, self._options.identified))
+        if status != waiting.TAKEN:
+            why = LATE if status == waiting.LATE else "overflow"
             self.counts[f"{reading.sensor.name.lower()}: {why}"] += 1
             self.serving.refused(reading.sensor, reading.t_s, LATE)
             return
         self.readings[reading.sensor] += 1
-        self.heard_s[reading.sensor], self.latest[reading.sensor] = now_s, reading
+        self.received_s[reading.sensor], self.latest[reading.sensor] = now_s, reading
         self.newest_s = reading.t_s if self.newest_s != self.newest_s else max(self.newest_s, reading.t_s)
-        self.flow_waited += self.flow_came and reading.sensor in FLOW
-        self.flow_came = self.flow_came or reading.sensor in FLOW
+        self.flow_waited += self.flow_arrived and reading.sensor in FLOW
+        self.flow_arrived = self.flow_arrived or reading.sensor in FLOW
         if reading.sensor == Sensor.LANDED:
             self.serving.landed(bool(reading.value[0]))
         if self.since_s != self.since_s:

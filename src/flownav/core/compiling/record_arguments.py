@@ -46,7 +46,7 @@ def _record_model(models: Any, kind: Any) -> Any:
     return (UniTupleModel if uniform else TupleModel)(models, kind)
 
 
-def hand_over_whole() -> None:
+def pass_records_whole() -> None:
     """From now on, in this process; not with `FLOWNAV_PLAIN=1`."""
     if not Leanness.wanted:
         return

@@ -29,11 +29,11 @@ def attitude_of(state: HelicopterState) -> Rotation:
     return rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
 
 
-def told(read: Any, values: tuple[str, ...], variances: tuple[str, ...] = ()) -> Callable[..., Reading]:
+def reads(read: Any, values: tuple[str, ...], variances: tuple[str, ...] = ()) -> Callable[..., Reading]:
     """`say(read)`: the reading of these fields of what a sensor read, with the variances that it states of them."""
-    said = [f"read.{name}" for name in values] + ["0.0"] * (3 - len(values))
-    said += ["nan"] * (6 - len(said)) + [f"read.{name}" for name in variances] + ["nan"] * (3 - len(variances))
-    source = f"def say(read):\n    return Reading({', '.join(said)}, read.quality, read.arrived, 0.0)\n"
+    parts = [f"read.{name}" for name in values] + ["0.0"] * (3 - len(values))
+    parts += ["nan"] * (6 - len(parts)) + [f"read.{name}" for name in variances] + ["nan"] * (3 - len(variances))
+    source = f"def say(read):\n    return Reading({', '.join(parts)}, read.quality, read.arrived, 0.0)\n"
     say = write_function("say", source, {"Reading": Reading, "nan": np.nan})
     say.__annotations__ = {"read": read, "return": Reading}
     return equation(say)
@@ -71,7 +71,7 @@ class Looked(NamedTuple):
     """A flow reading with the vehicle's own gyro beside it; the exposure begins anew."""
 
     state: flow_camera.FlowCameraState
-    said: Reading
+    reading: Reading
     sees: SeesFlow
     exposed: Exposed
 
@@ -122,11 +122,11 @@ def look(
 ) -> Looked:  # fmt: skip
     """Angular flow over the exposure, with the sensor's own gyro and the vehicle's over the same time beside it."""
     after, read = flow_camera.step_flow_camera(state, unit, truth, n, sensor, p)
-    said = Reading(
+    reading = Reading(
         read.flow_x_rad_s, read.flow_y_rad_s, read.gyro_x_rad_s, read.gyro_y_rad_s, turned.gyro_x, turned.gyro_y,
         np.nan, np.nan, np.nan, read.quality, read.arrived, 0.0,
     )  # fmt: skip
-    return Looked(after, said, SeesFlow(1.0 if read.quality > 0.0 else 0.0), Exposed(0.0, 0.0, 0.0, 0.0, 0.0))
+    return Looked(after, reading, SeesFlow(1.0 if read.quality > 0.0 else 0.0), Exposed(0.0, 0.0, 0.0, 0.0, 0.0))
 
 
 # -- pad camera ---------------------------------------------------------------------------------------------------
@@ -174,7 +174,7 @@ class Touched(NamedTuple):
 
     state: skid_switch.SkidSwitchState
     landed: Landed
-    said: skid_switch.SkidSwitchReading
+    reading: skid_switch.SkidSwitchReading
 
 
 def see_load(loads: Loads) -> float:
@@ -204,7 +204,7 @@ class Moved(NamedTuple):
     """An inertial reading, added to what the flow camera's exposure turned."""
 
     state: inertial.InertialState
-    said: inertial.InertialReading
+    reading: inertial.InertialReading
     exposed: Exposed
 
 

@@ -25,7 +25,7 @@ _in_between: list[Callable[[], object]] = []
 _begun: dict[tuple[str, str], subprocess.Popen[bytes]] = {}
 
 
-def compile_beside(unit: Unit, kernel: Any, *arguments: Any, whole: str = "") -> None:
+def compile_in_parallel(unit: Unit, kernel: Any, *arguments: Any, whole: str = "") -> None:
     """Make a unit and a kernel ready for calls with such arguments: side by side where neither is in the cache.
 
     The arguments are only looked at for their types; whole: what both are together, in words for people. Does nothing
@@ -45,10 +45,10 @@ def compile_beside(unit: Unit, kernel: Any, *arguments: Any, whole: str = "") ->
                     other.wait(PATIENCE_S)
 
 
-def begin_beside(module: str, name: str) -> None:
+def begin_in_parallel(module: str, name: str) -> None:
     """Where nothing has ever been compiled, begin on a unit that will be needed before what needs it is imported.
 
-    `compile_beside` takes the process over; it ends with this process otherwise.
+    `compile_in_parallel` takes the process over; it ends with this process otherwise.
     """
     if STORE.is_empty() and can_pay() and not _begun:
         with suppress(OSError):

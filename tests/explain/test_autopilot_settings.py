@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from flownav.studies.explain.told import ARDUPILOT, BARO, GPS, PX4, RANGE, UNKNOWN, told
+from flownav.studies.explain.autopilot_settings import ARDUPILOT, BARO, GPS, PX4, RANGE, UNKNOWN, settings_stated
 
 
 def test_nothing_is_told_by_nothing():
-    facts = told({})
+    facts = settings_stated({})
     assert (facts.dialect, facts.sets, facts.takes_flow, facts.flow_delay_s) == (UNKNOWN, (), None, None)
 
 
 def test_px4_of_today():
-    facts = told(
+    facts = settings_stated(
         {
             "EKF2_OF_CTRL": 1,
             "EKF2_GPS_CTRL": 7,
@@ -38,7 +38,7 @@ def test_px4_of_today():
 
 
 def test_px4_without_a_receiver_takes_no_gps():
-    one = told({"EKF2_OF_CTRL": 0, "EKF2_GPS_CTRL": 7, "SYS_HAS_GPS": 0}).set_at(1)
+    one = settings_stated({"EKF2_OF_CTRL": 0, "EKF2_GPS_CTRL": 7, "SYS_HAS_GPS": 0}).set_at(1)
     assert one is not None
     assert (one.flow, one.gps, one.height) == (False, False, GPS)
 
@@ -47,13 +47,13 @@ def test_px4_without_a_receiver_takes_no_gps():
     ("mask", "flow", "gps"), [(1, False, True), (2, True, False), (3, True, True), (0, False, False)]
 )
 def test_px4_before_1_14(mask, flow, gps):
-    one = told({"EKF2_AID_MASK": mask, "EKF2_HGT_MODE": 0}).set_at(1)
+    one = settings_stated({"EKF2_AID_MASK": mask, "EKF2_HGT_MODE": 0}).set_at(1)
     assert one is not None
     assert (one.flow, one.gps, one.height) == (flow, gps, BARO)
 
 
 def test_ardupilot_and_its_source_sets():
-    facts = told(
+    facts = settings_stated(
         {
             "EK3_SRC1_POSXY": 3,
             "EK3_SRC1_VELXY": 3,
@@ -89,4 +89,4 @@ def test_ardupilot_and_its_source_sets():
 
 
 def test_metres_of_ardupilot_4_7_stand_above_centimetres():
-    assert told({"EK3_ALT_M_NSE": 2.0, "RNGFND1_MAX": 12.0, "RNGFND1_MAX_CM": 700}).range_high_m == 12.0
+    assert settings_stated({"EK3_ALT_M_NSE": 2.0, "RNGFND1_MAX": 12.0, "RNGFND1_MAX_CM": 700}).range_high_m == 12.0

@@ -1,6 +1,6 @@
 """Work that Numba does again at every line, done once: typing of operators, looks into signatures and instructions.
 
-All of this is only in force inside `remembering()`, and changes no result. A part that this version of Numba does not
+All of this is only in force inside `memoising()`, and changes no result. A part that this version of Numba does not
 have stays as Numba has it, and with `FLOWNAV_PLAIN=1` all do (docs/explanation/numba.md).
 """
 
@@ -23,7 +23,7 @@ _hashes: dict[int, tuple[int, Any]] = {}  # by id, each with its type, which is 
 
 
 @contextmanager
-def remembering() -> Iterator[None]:
+def memoising() -> Iterator[None]:
     """Remember inside the block, where this version of Numba has these parts."""
     with ExitStack() as stack:
         for owner, name, replacement in PATCHES if Leanness.wanted else ():
@@ -162,7 +162,7 @@ def _received(self: Any, builder: Any, value: Any) -> Any:
 
 
 def _own(owner: Any, name: str) -> Any:
-    """A part of Numba; None where this version has none of the name, and `remembering` leaves it alone."""
+    """A part of Numba; None where this version has none of the name, and `memoising` leaves it alone."""
     return getattr(owner, name, None)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from flownav.core.compiling import beside, closure
+from flownav.core.compiling import closure, parallel
 from flownav.core.compiling.units import unit
 from forking import Nursery, interruptible, nursery
 
@@ -38,7 +38,7 @@ PROGRAM = """
 import os, sys
 import numpy as np
 from flownav.core.compile import announce_compilation, begin_beside, compile_beside, meanwhile
-from flownav.core.compiling import beside
+from flownav.core.compiling import parallel
 from flownav.core.compiling.cache import STORE
 from parts import SHIFT, apply
 
@@ -181,7 +181,7 @@ def test_an_interrupted_program_leaves_no_process(place):
 
 
 def test_the_other_process_ends_with_its_parent(place):
-    with started(place, "-m", "flownav.core.compiling.beside", "parts", "SHIFT") as other:
+    with started(place, "-m", "flownav.core.compiling.parallel", "parts", "SHIFT") as other:
         assert other.wait(HUNG_S) == 1
     assert left_over(place) == []
 
@@ -190,4 +190,4 @@ def test_a_unit_that_no_other_process_finds_has_no_name():
     def nothing(p):
         p[0] = 0.0
 
-    assert beside.name_of(unit(nothing, "p")) is None
+    assert parallel.name_of(unit(nothing, "p")) is None

@@ -32,7 +32,7 @@ class SourceSet(NamedTuple):
     external: bool = False
 
 
-class Told(NamedTuple):
+class AutopilotSettings(NamedTuple):
     """The facts. Delays [s], lengths [m], rates [rad/s]; None where nothing states it.
 
     height_noise_m: of the height's source. flow_turn_deg: by which the autopilot turns the flow's axes. scale_x, _y:
@@ -74,12 +74,14 @@ def dialect_of(parameters: Mapping[str, float]) -> str:
     return INAV if INAV_SCALE in parameters else UNKNOWN
 
 
-def told(parameters: Mapping[str, float]) -> Told:
+def settings_stated(parameters: Mapping[str, float]) -> AutopilotSettings:
     """The facts that a log's parameters state."""
-    return {PX4: _px4, ARDUPILOT: _ardupilot}.get(dialect_of(parameters), lambda _: Told(UNKNOWN))(parameters)
+    return {PX4: _px4, ARDUPILOT: _ardupilot}.get(dialect_of(parameters), lambda _: AutopilotSettings(UNKNOWN))(
+        parameters
+    )
 
 
-def _px4(p: Mapping[str, float]) -> Told:
+def _px4(p: Mapping[str, float]) -> AutopilotSettings:
     flow, gps, height = _px4_aids(p)
     sets: tuple[SourceSet, ...] = ()
     if flow is not None:
@@ -96,7 +98,7 @@ def _px4(p: Mapping[str, float]) -> Told:
     noise = {BARO: "EKF2_BARO_NOISE", RANGE: "EKF2_RNG_NOISE", GPS: "EKF2_GPS_P_NOISE"}.get(height or "", "")
     scale = p.get("SENS_FLOW_SCALE")
     rotation = p.get("SENS_FLOW_ROT")
-    return Told(
+    return AutopilotSettings(
         PX4, sets,
         flow_delay_s=_times(p.get("EKF2_OF_DELAY"), 1e-3), gps_delay_s=_times(p.get("EKF2_GPS_DELAY"), 1e-3),
         flow_turn_deg=45.0 * rotation if rotation is not None and 0 <= rotation <= 7 else None,
@@ -119,7 +121,7 @@ def _px4_aids(p: Mapping[str, float]) -> tuple[bool | None, bool | None, str | N
     return None, None, None
 
 
-def _ardupilot(p: Mapping[str, float]) -> Told:
+def _ardupilot(p: Mapping[str, float]) -> AutopilotSettings:
     sets = tuple(
         SourceSet(
             n, p.get(f"EK3_SRC{n}_VELXY") == FLOW_IN_SET,
@@ -135,7 +137,7 @@ def _ardupilot(p: Mapping[str, float]) -> Told:
     low, high = (
         _first(p, (f"RNGFND1_{end}", 1.0), (f"RNGFND1_{end}_CM", CENTIMETRE)) for end in ("MIN", "MAX")
     )  # metres since ArduPilot 4.7
-    return Told(
+    return AutopilotSettings(
         ARDUPILOT, sets,
         flow_delay_s=None if delay is None else delay + EKF3_AVERAGING_S,
         gps_delay_s=_first(p, ("GPS1_DELAY_MS", 1e-3), ("GPS_DELAY_MS", 1e-3)) or None,

@@ -17,11 +17,11 @@ from flownav.core.compiling.scalars import bits_from_float, float_from_bits
 PASSED = (types.CPointer, types.Integer, types.Float, types.Boolean)
 
 try:
-    from flownav.core.compiling.handed import hand_over_whole
+    from flownav.core.compiling.record_arguments import pass_records_whole
 except (ImportError, AttributeError):
     pass  # a Numba with other models of tuples: it takes each apart, which costs time only
 else:
-    hand_over_whole()
+    pass_records_whole()
 
 
 @typeof_impl.register(Kernel)

@@ -15,7 +15,7 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 from numba.extending import lower_builtin
 
 
-def load_spelled(function: Callable[..., Any], bundle: type, rows: tuple[int, ...] | None) -> Callable[..., Any]:
+def load_intrinsic(function: Callable[..., Any], bundle: type, rows: tuple[int, ...] | None) -> Callable[..., Any]:
     """`load(work, lanes, lane)` of the generated Python function; rows None: the first is an argument, before the
     lane.
     """
@@ -29,16 +29,16 @@ def load_spelled(function: Callable[..., Any], bundle: type, rows: tuple[int, ..
         at = [builder.load(place) for place in _places(context, builder, sig, args[0], args[2:], rows, len(fields))]
         return context.make_tuple(builder, kind, at)
 
-    return _spelled(function, _on_work(typed), lowered)
+    return _intrinsic(function, _on_work(typed), lowered)
 
 
-def store_spelled(function: Callable[..., Any], bundle: type, rows: tuple[int, ...] | None) -> Callable[..., Any]:
+def store_intrinsic(function: Callable[..., Any], bundle: type, rows: tuple[int, ...] | None) -> Callable[..., Any]:
     """`store(work, lanes, lane, value)` likewise; fields that the value leaves out are stored by their defaults."""
     fields: tuple[str, ...] = bundle._fields  # type: ignore[attr-defined]
     defaults: dict[str, float] = bundle._field_defaults  # type: ignore[attr-defined]
 
-    def typed(work: Any, lanes: Any, *told: Any) -> Any:
-        *places, value = told
+    def typed(work: Any, lanes: Any, *arguments: Any) -> Any:
+        *places, value = arguments
         if getattr(value, "fields", ()) != fields or not set(fields[len(value) :]) <= set(defaults):
             return None
         return signature(types.none, work, lanes, *(types.intp for _ in places), value)
@@ -54,40 +54,40 @@ def store_spelled(function: Callable[..., Any], bundle: type, rows: tuple[int, .
             builder.store(number, place)
         return context.get_dummy_value()
 
-    return _spelled(function, _on_work(typed), lowered)
+    return _intrinsic(function, _on_work(typed), lowered)
 
 
-def replaced_spelled(function: Callable[..., Any], bundle: type, names: tuple[str, ...]) -> Callable[..., Any]:
+def replaced_intrinsic(function: Callable[..., Any], bundle: type, names: tuple[str, ...]) -> Callable[..., Any]:
     """`replaced(value, **named)` of the generated Python function."""
     fields: tuple[str, ...] = bundle._fields  # type: ignore[attr-defined]
-    told = inspect.signature(function)
+    signature_of_function = inspect.signature(function)
 
     def typed(args: Any, kws: Any) -> Any:
-        value, *new = told.bind(*args, **kws).args
+        value, *new = signature_of_function.bind(*args, **kws).args
         if getattr(value, "fields", ()) != fields:
             return None
         parts = dict(zip(fields, value, strict=True)) | dict(zip(names, map(types.unliteral, new), strict=True))
         kind = types.BaseTuple.from_types(tuple(parts.values()), bundle)
-        return signature(kind, value, *(parts[name] for name in names)).replace(pysig=told)
+        return signature(kind, value, *(parts[name] for name in names)).replace(pysig=signature_of_function)
 
     def lowered(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         new = dict(zip(names, args[1:], strict=True))
         parts = (new[name] if name in new else builder.extract_value(args[0], i) for i, name in enumerate(fields))
         return context.make_tuple(builder, sig.return_type, list(parts))
 
-    return _spelled(function, typed, lowered)
+    return _intrinsic(function, typed, lowered)
 
 
 def _places(
-    context: Any, builder: Any, sig: Any, work: Any, told: Any, rows: tuple[int, ...] | None, count: int
+    context: Any, builder: Any, sig: Any, work: Any, places_given: Any, rows: tuple[int, ...] | None, count: int
 ) -> list[Any]:
     """Where each field of a lane stands, as addresses."""
-    kind, width, integer = sig.args[0], sig.args[1].count, told[-1].type
+    kind, width, integer = sig.args[0], sig.args[1].count, places_given[-1].type
     begin = work if isinstance(kind, types.CPointer) else context.make_array(kind)(context, builder, value=work).data
     if rows is None:
-        first = builder.add(builder.mul(told[0], integer(width)), told[-1])
+        first = builder.add(builder.mul(places_given[0], integer(width)), places_given[-1])
         return [builder.gep(begin, [builder.add(first, integer(i * width))]) for i in range(count)]
-    return [builder.gep(begin, [builder.add(told[-1], integer(row * width))]) for row in rows]
+    return [builder.gep(begin, [builder.add(places_given[-1], integer(row * width))]) for row in rows]
 
 
 def _on_work(typed: Callable[..., Any]) -> Callable[..., Any]:
@@ -102,10 +102,10 @@ def _on_work(typed: Callable[..., Any]) -> Callable[..., Any]:
     return of_call
 
 
-def _spelled(
+def _intrinsic(
     function: Callable[..., Any], typed: Callable[..., Any], lowered: Callable[..., Any]
 ) -> Callable[..., Any]:
-    class Spelled(AbstractTemplate):
+    class Intrinsic(AbstractTemplate):
         """Its type."""
 
         key = function
@@ -113,6 +113,6 @@ def _spelled(
         def generic(self, args: Any, kws: Any) -> Any:
             return typed(args, kws)
 
-    infer_global(function, types.Function(Spelled))
+    infer_global(function, types.Function(Intrinsic))
     lower_builtin(function, types.VarArg(types.Any))(lowered)
     return function

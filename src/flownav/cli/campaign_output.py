@@ -58,12 +58,12 @@ def watching(plan: Plan) -> Iterator[Callable[[CampaignProgress], None]]:
     )  # fmt: skip
     total = plan.flights * len(plan.cells)
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task, told = bar.add_task("", total=total, cell=plan.cells[0].label, figure=""), set[str]()
+        task, shown = bar.add_task("", total=total, cell=plan.cells[0].label, figure=""), set[str]()
 
         def show_progress(how_far: CampaignProgress) -> None:
             for line in how_far.damaged:
-                if line not in told:
-                    told.add(line)
+                if line not in shown:
+                    shown.add(line)
                     bar.console.print(f"flownav: {line}; its flights are flown again", markup=False, soft_wrap=True)
             words = figure_words(how_far)
             bar.update(task, completed=how_far.have, total=how_far.most, cell=how_far.cell, figure=words)
@@ -137,8 +137,8 @@ def fly_again(plan: Plan, path: Path, as_json: bool) -> None:
 
 def say_flight(facts: dict[str, Any], which: str, as_json: bool) -> None:
     """A flight that was flown again, and where it lies."""
-    said = f"{facts['cell']}, {which}\nrecord  {facts['record']}\nreport  {facts['report']}"
-    answer(facts, as_json, lambda: typer.echo(said))
+    message = f"{facts['cell']}, {which}\nrecord  {facts['record']}\nreport  {facts['report']}"
+    answer(facts, as_json, lambda: typer.echo(message))
 
 
 def show_rare(facts: dict[str, Any], rate: float, where: dict[str, str]) -> None:

@@ -30,7 +30,7 @@ class Other(NamedTuple):
 
 load, store = lane_access(Record, 2)
 load_scattered, store_scattered = lane_access(Record, (7, 1, 5))
-load_told, store_told = lane_access(Record, None)
+load_stated_attitude, store_stated_attitude = lane_access(Record, None)
 _, store_defaulted = lane_access(Defaulted, (7, 1, 5))
 with_two = replacing(Record, "third", "first")
 
@@ -41,9 +41,9 @@ def turned(buffer, lanes, row):
     for lane in range(len(lanes)):
         r = load(work, lanes, lane)
         s = load_scattered(work, lanes, lane)
-        t = load_told(work, lanes, row, lane)
+        t = load_stated_attitude(work, lanes, row, lane)
         store_scattered(work, lanes, lane, with_two(r, first=t.second, third=s.first + lane))
-        store_told(work, lanes, row, lane, Record(s.third, True, 3))
+        store_stated_attitude(work, lanes, row, lane, Record(s.third, True, 3))
         store(work, lanes, lane, t)
 
 

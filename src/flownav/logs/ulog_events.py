@@ -9,7 +9,14 @@ from flownav.logs.happened import CLIPPING, FUSES_FLOW, MODE, Happened, changes,
 from flownav.logs.ulog_topics import Topics
 
 ASKED = ("vehicle_local_position_setpoint", "vehicle_attitude_setpoint")
-SAID = ("vehicle_status", "estimator_status_flags", "estimator_status", "vehicle_imu_status", "battery_status", *ASKED)
+EVENT_TOPICS = (
+    "vehicle_status",
+    "estimator_status_flags",
+    "estimator_status",
+    "vehicle_imu_status",
+    "battery_status",
+    *ASKED,
+)
 FIELDS = (
     "nav_state",
     "cs_opt_flow",
@@ -26,8 +33,8 @@ CLIPPING_S = 1.0
 
 def happened(topics: Topics) -> tuple[Happened, ...]:
     """All events in the topics and the logged strings, in order of time."""
-    told = ((t_s - topics.start_s, text) for t_s, text in topics.messages)
-    return in_time([*_states(topics), *messages(told)])
+    texts = ((t_s - topics.start_s, text) for t_s, text in topics.messages)
+    return in_time([*_states(topics), *messages(texts)])
 
 
 def _states(topics: Topics) -> Iterator[Happened]:
@@ -59,13 +66,13 @@ def setpoints(topics: Topics) -> tuple[Table, ...]:
 
 def battery(topics: Topics) -> Table | None:
     """The battery that was reported most often; None where none was, or none with a voltage."""
-    told = topics.fullest("battery_status", needs=("voltage_v",))
-    if told is None or not (told.column("voltage_v") > 0.0).any():
+    rows = topics.fullest("battery_status", needs=("voltage_v",))
+    if rows is None or not (rows.column("voltage_v") > 0.0).any():
         return None
     known = {}
     for name, here, scale in (("voltage_v", "voltage_v", 1.0), ("current_a", "current_a", 1.0),
                               ("remaining", "remaining_percent", 100.0)):  # fmt: skip
-        if told.has(name):
-            values = told.column(name)
+        if rows.has(name):
+            values = rows.column(name)
             known[here] = np.where(values >= 0.0, scale * values, np.nan)  # -1: not known
-    return {"t_s": told.t_s, **known}
+    return {"t_s": rows.t_s, **known}

@@ -64,7 +64,7 @@ PARTS = tuple(
 class Judged(NamedTuple):
     """One flight from the instant t0 on, (n,) steps of the estimate.
 
-    error_m, level_m (n, 2): horizontal and vertical. said (n,): whether a warning stands. raised: the warnings that
+    error_m, level_m (n, 2): horizontal and vertical. warned (n,): whether a warning stands. raised: the warnings that
     were raised, "flow doubted", in the whole flight, or from t0 on where a sensor fails. since_s (n,): since t0;
     lasts_s: how long the fault lasts.
     """
@@ -72,7 +72,7 @@ class Judged(NamedTuple):
     fault: str
     error_m: NDArray[np.float32]
     level_m: NDArray[np.float32]
-    said: NDArray[np.bool_]
+    warned: NDArray[np.bool_]
     raised: frozenset[str]
     since_s: NDArray[np.float32] = np.zeros(0, np.float32)
     lasts_s: float = 0.0
@@ -80,14 +80,14 @@ class Judged(NamedTuple):
     @property
     def above(self) -> NDArray[np.bool_]:
         """(n, 2): error above the level without a warning; a level that is no number protects from nothing."""
-        found: NDArray[np.bool_] = ~(self.error_m <= self.level_m) & ~self.said[:, None]
+        found: NDArray[np.bool_] = ~(self.error_m <= self.level_m) & ~self.warned[:, None]
         return found
 
 
 class When(NamedTuple):
     """When errors are above the level without a warning, for faults of one duration; pairs are horizontal and vertical.
 
-    beyond: flights in which they ever are. unsaid: share of all steps. shares: of those steps, while the fault lasts,
+    beyond: flights in which they ever are. unwarned: share of all steps. shares: of those steps, while the fault lasts,
     in the AFTERWARDS_S after it, and later.
     """
 
@@ -95,24 +95,24 @@ class When(NamedTuple):
     lasts_s: float
     flights: int
     beyond: tuple[int, int]
-    unsaid: tuple[float, float]
+    unwarned: tuple[float, float]
     shares: tuple[tuple[float, float], ...]
 
 
 class Row(NamedTuple):
     """The result of all flights with one fault; pairs are horizontal and vertical.
 
-    raised: share of flights in which each warning was raised. said: share of steps at which any stands. unsaid: share
-    of steps at which the error is above the level and none stands. beyond_m: by how much it is above, at most. ratio,
-    level_m: medians over steps of level / error and of the level.
+    raised: share of flights in which each warning was raised. warned: share of steps at which any stands. unwarned:
+    share of steps at which the error is above the level and none stands. beyond_m: by how much it is above, at most.
+    ratio, level_m: medians over steps of level / error and of the level.
     """
 
     fault: str
     flights: int
     steps: int
     raised: dict[str, float]
-    said: float
-    unsaid: tuple[float, float]
+    warned: float
+    unwarned: tuple[float, float]
     beyond_m: tuple[float, float]
     ratio: tuple[float, float]
     level_m: tuple[float, float]
@@ -167,7 +167,7 @@ def row_of(name: str, flights: Sequence[Judged]) -> Row:
     """One row of the table, of all steps of some flights."""
     error = np.concatenate([flight.error_m for flight in flights])
     level = np.concatenate([flight.level_m for flight in flights])
-    said = np.concatenate([flight.said for flight in flights])
+    said = np.concatenate([flight.warned for flight in flights])
     above = np.concatenate([flight.above for flight in flights])
     warnings = Counter(warning for flight in flights for warning in flight.raised)
     beyond = np.where(above, error - level, 0.0).max(axis=0)
@@ -278,8 +278,8 @@ def when_table(rows: Sequence[When]) -> str:
     for row in rows:
         spells = [" / ".join(f"{100.0 * pair[axis]:.0f}" for pair in row.shares) for axis in range(2)]
         shown = [said if row.beyond[axis] else "-" for axis, said in enumerate(spells)]
-        unsaid = [f"{1000.0 * share:.2f}" for share in row.unsaid]
-        lines.append((f"`{row.fault}`", f"{row.lasts_s:g}", str(row.flights), *map(str, row.beyond), *unsaid, *shown))
+        unwarned = [f"{1000.0 * share:.2f}" for share in row.unwarned]
+        lines.append((f"`{row.fault}`", f"{row.lasts_s:g}", str(row.flights), *map(str, row.beyond), *unwarned, *shown))
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
@@ -300,11 +300,11 @@ def placed(page: str, text: str, name: str, first: str = BEGIN, last: str = END)
 
 
 def _cells(row: Row) -> tuple[str, ...]:
-    percent = [f"{100.0 * share:.1f}" for share in (row.raised.get(SUSPECTS, 0.0), row.said)]
-    unsaid = [f"{1000.0 * share:.2f}" for share in row.unsaid]
+    percent = [f"{100.0 * share:.1f}" for share in (row.raised.get(SUSPECTS, 0.0), row.warned)]
+    unwarned = [f"{1000.0 * share:.2f}" for share in row.unwarned]
     metres = [f"{value:.2f}" for value in (*row.beyond_m, *row.ratio, *row.level_m)]
     name = f"`{row.fault}`" if " " not in row.fault else f"**{row.fault}**"
-    return (name, str(row.flights), *percent, *unsaid, *metres)
+    return (name, str(row.flights), *percent, *unwarned, *metres)
 
 
 # -- as a program ----------------------------------------------------------------------------------------------------

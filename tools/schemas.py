@@ -23,7 +23,7 @@ PROVENANCE = {"value", "uncertainty", "source"}  # of a number written as a tabl
 
 
 class Key(NamedTuple):
-    """What a file may have under a key: types, range (of numbers), and whether the key must be there."""
+    """A key that a file may have: types, range (of numbers), and whether the key must be there."""
 
     types: list[str]
     low: float

@@ -1,6 +1,6 @@
 """Each witness lies in turn: every sensor of the whole mission, in every way and in every phase, and what it cost.
 
-One flight of the scenario `sortie` a seed, flown on its own navigator; its recorded readings then go through the same
+One flight of the scenario `sortie` a seed, with its own navigator; its recorded readings then go through the same
 navigator again with one lie of LASTS_S in them. The flight is not changed by the lie, so that what moves is the
 estimate alone (an autopilot that uses it is in `flownav faults`). The same readings give the same bits in flight, from
 a log and on a link (tests/navigation, tests/live), so that one way in stands for all.
@@ -229,12 +229,12 @@ def table(found: Sequence[Cost]) -> str:
 def section(found: Sequence[Cost], seeds: int) -> str:
     """The table, and what it comes to."""
     back = np.mean([one.back_s is not None and one.back_s <= AFTER_S for one in found])
-    unsaid = sum(one.beyond_s > 0.0 for one in found)
+    unwarned = sum(one.beyond_s > 0.0 for one in found)
     return (
         f"Printed by `make witnesses`, flownav {__version__}: {len(found)} lies of {LASTS_S:g} s in {seeds} flights "
         f"of `{SCENARIO}`, seeds from {FIRST_SEED}. Right again within {AFTER_S:g} s of the lie's end: "
         f"{100.0 * back:.1f} %. Beyond a protection level without a warning at any instant at which the flight without "
-        f"the lie was not: {unsaid} of {len(found)}.\n\n{table(found)}"
+        f"the lie was not: {unwarned} of {len(found)}.\n\n{table(found)}"
     )
 
 

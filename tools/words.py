@@ -51,7 +51,9 @@ BANNED_IN_NAMES = (
     "failing",
 )
 PAGES = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md")
-_WORDS = re.compile(r"\b(" + "|".join(sorted(map(re.escape, BANNED), key=len, reverse=True)) + r")\b", re.IGNORECASE)
+_WORDS = re.compile(
+    r"(?<!-)\b(" + "|".join(sorted(map(re.escape, BANNED), key=len, reverse=True)) + r")\b", re.IGNORECASE
+)
 _CODE = re.compile(r"`[^`]*`|\]\([^)]*\)")
 _PARTS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 
@@ -142,7 +144,7 @@ def _docstring(node: ast.AST) -> ast.Constant | None:
 
 
 def in_module(source: str, file: str) -> Iterator[Finding]:
-    """What a Python file is searched for, which depends on where it lies."""
+    """Findings of a Python file; which words are searched for depends on where it lies."""
     tree = ast.parse(source)
     yield from in_docstrings(tree, file)
     if file.startswith("tests/"):

@@ -195,9 +195,9 @@ def test_a_row_by_hand():
 
 
 def test_what_falls_short_is_named():
-    lost = verdict("b-x", 0, 4.0, 0.3, unsaid=0.1, nis_flow=4.0, nis_range=0.02)._replace(ours=Line(4.0, 5.0, 20.0))
+    lost = verdict("b-x", 0, 4.0, 0.3, unwarned=0.1, nis_flow=4.0, nis_range=0.02)._replace(ours=Line(4.0, 5.0, 20.0))
     row = row_of("b-x", [lost])
-    names = ["median", "p95", "heading", "heading p95", "diverges", "unsaid", "NIS flow", "NIS range"]
+    names = ["median", "p95", "heading", "heading p95", "diverges", "unwarned", "NIS flow", "NIS range"]
     assert failings(row) == names
     assert failings(row_of("b-x", [verdict("b-x", 0, 0.3, 0.3)])) == []
 
@@ -313,7 +313,7 @@ def test_a_recorded_flight_has_the_row_that_its_judge_knows_from_the_exact_truth
         assert ours.worst_m == pytest.approx(theirs.worst_m, abs=0.05)
         assert ours.heading_deg == pytest.approx(theirs.heading_deg, abs=0.3)
     assert found.level_m == pytest.approx(known.level_m, rel=0.1)
-    assert found.unsaid == pytest.approx(known.unsaid, abs=0.01)
+    assert found.unwarned == pytest.approx(known.unwarned, abs=0.01)
 
 
 def test_errors_of_a_line_are_those_of_a_path_that_bends_away_whole_turns_aside():
@@ -330,7 +330,7 @@ def test_errors_of_a_line_are_those_of_a_path_that_bends_away_whole_turns_aside(
 
 def test_the_table_has_a_row_a_flight_their_median_and_their_worst():
     row = Row("one", Line(0.1, 0.5, 2.0), Line(0.2, 0.6, 4.0), 3.0, 0.0)
-    lines = as_markdown([row, row._replace(name="two", ours=Line(0.3, 0.7, 1.0), unsaid=0.25)]).splitlines()
+    lines = as_markdown([row, row._replace(name="two", ours=Line(0.3, 0.7, 1.0), unwarned=0.25)]).splitlines()
     assert len(lines) == 6
     assert lines[2] == "| one | 0.10 | 0.50 | 2.0 | 0.20 | 0.60 | 4.0 | 3.0 | 0.0 |"
     assert lines[4] == "| **median** | 0.20 | 0.60 | 1.5 | 0.20 | 0.60 | 4.0 | 3.0 | 12.5 |"

@@ -104,7 +104,7 @@ print(json.dumps({**found, "flight": digest(flown)}))
 
 @pytest.fixture(scope="module")
 def computed(tmp_path_factory):
-    """What the program finds, by whether Numba stays as it is; each way compiles into a cache of its own."""
+    """Results of the program, by whether Numba stays as it is; each way compiles into a cache of its own."""
     place = tmp_path_factory.mktemp("plain")
     program = place / "program.py"
     program.write_text(PROGRAM)

@@ -70,7 +70,7 @@ def test_a_warning_stands_from_when_it_is_raised_and_counts_from_the_fault_on():
     before, after = Flag(2.0, 4.5, "flow", "doubted"), Flag(6.0, np.inf, *SUSPECTS.split())
     run = run_of([0.0, 0.0, 0.0], [1.0, 1.0], [before, after])
     found = judged("late", run, STILL, 4.0, 4.0)
-    assert found.said.tolist() == [True, False, False, False, *[True] * 8]
+    assert found.warned.tolist() == [True, False, False, False, *[True] * 8]
     assert found.raised == {SUSPECTS}
     assert judged("none", run, STILL, 4.0, -np.inf).raised == {SUSPECTS, "flow doubted"}
 
@@ -79,17 +79,17 @@ def test_an_error_above_the_level_counts_where_nothing_is_said():
     row = row_of("late", [steps([5.0, 1.0], [4.0, 2.0]), steps([5.0, 1.0], [6.0, 2.0]),
                           steps([9.0, 9.0], [4.0, 2.0], True, [SUSPECTS])])  # fmt: skip
     assert (row.flights, row.steps) == (3, 12)
-    assert row.unsaid == pytest.approx((1.0 / 3.0, 0.0))
+    assert row.unwarned == pytest.approx((1.0 / 3.0, 0.0))
     assert row.beyond_m == pytest.approx((1.0, 0.0))
     assert row.ratio == pytest.approx((0.8, 2.0))
     assert row.level_m == pytest.approx((4.0, 2.0))
-    assert row.said == pytest.approx(1.0 / 3.0)
+    assert row.warned == pytest.approx(1.0 / 3.0)
     assert row.raised == {SUSPECTS: pytest.approx(1.0 / 3.0)}
 
 
 @pytest.mark.parametrize(("error_m", "level_m"), [(1.0, np.nan), (np.inf, 5.0), (np.inf, np.nan)])
 def test_what_is_no_number_protects_from_nothing(error_m, level_m):
-    assert row_of("late", [steps([error_m, 0.0], [level_m, 1.0])]).unsaid == (1.0, 0.0)
+    assert row_of("late", [steps([error_m, 0.0], [level_m, 1.0])]).unwarned == (1.0, 0.0)
 
 
 def test_a_navigator_without_levels_cannot_be_judged():
@@ -100,7 +100,7 @@ def test_a_navigator_without_levels_cannot_be_judged():
 def test_all_faults_together_leave_the_flights_without_one_out():
     rows = rows_of([steps([1, 1], [2, 2], fault="none"), steps([3, 1], [2, 2]), steps([1, 1], [2, 2], fault="lost")])
     assert [row.fault for row in rows] == ["late", "lost", TOGETHER, "none"]
-    assert [row.unsaid[0] for row in rows] == [1.0, 0.0, 0.5, 0.0]
+    assert [row.unwarned[0] for row in rows] == [1.0, 0.0, 0.5, 0.0]
     assert rows_of([]) == []
 
 
@@ -113,7 +113,7 @@ def test_when_the_error_is_above_is_counted_by_spell_and_duration():
     sound = steps([1.0, 1.0], [2.0, 2.0], fault="lost")._replace(since_s=np.arange(4, dtype=np.float32))
     (found,) = whens_of([late, sound, late])
     assert found[:4] == ("late", 5.0, 2, (2, 0))
-    assert found.unsaid == pytest.approx((4.0 / 30.0, 0.0))
+    assert found.unwarned == pytest.approx((4.0 / 30.0, 0.0))
     assert found.shares == ((0.5, 0.0), (0.25, 0.0), (0.25, 0.0))
     lines = when_table([found]).splitlines()
     assert lines[2] == "| `late` | 5 | 2 | 2 | 0 | 133.33 | 0.00 | 50 / 25 / 25 | - |"
@@ -161,11 +161,11 @@ def test_flights_with_and_without_faults_are_judged(setup):
     for flight in found:
         assert np.isfinite(flight.error_m).all()
         assert np.isfinite(flight.level_m).all()
-        assert len(flight.error_m) == len(flight.level_m) == len(flight.said) > 100
+        assert len(flight.error_m) == len(flight.level_m) == len(flight.warned) > 100
         assert (flight.level_m > 0.0).all()
     assert len(found[3].error_m) < len(found[1].error_m)  # begins with the descent
     total = rows_of(found)[-2]
-    assert total.unsaid[0] < 0.01
+    assert total.unwarned[0] < 0.01
     assert total.level_m[0] < 5.0
 
 

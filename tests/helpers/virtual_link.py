@@ -28,7 +28,7 @@ class Clock:
 class VirtualLink(Link):
     """Datagrams between a session and the other end that answers; both live in the clock's time.
 
-    told: what arrives by an instant. hear: what is answered to a frame at an instant.
+    arriving: frames that arrive by an instant. hear: what is answered to a frame at an instant.
     """
 
     datagrams = True
@@ -36,11 +36,11 @@ class VirtualLink(Link):
     def __init__(
         self,
         clock: Clock,
-        told: Callable[[float], list[bytes]] = lambda now_s: [],
+        arriving: Callable[[float], list[bytes]] = lambda now_s: [],
         hear: Callable[[bytes, float], list[bytes]] = lambda frame, now_s: [],
     ) -> None:
         super().__init__()
-        self._clock, self._told, self._hear = clock, told, hear
+        self._clock, self._arriving, self._hear = clock, arriving, hear
         self._answers: list[bytes] = []
         self._always_ready = os.open(os.devnull, os.O_RDONLY)  # the loop waits for nothing
 
@@ -49,7 +49,7 @@ class VirtualLink(Link):
 
     def read(self) -> list[Any]:
         self._clock.now_s += STEP_S
-        frames, self._answers = [*self._answers, *self._told(self._clock.now_s)], []
+        frames, self._answers = [*self._answers, *self._arriving(self._clock.now_s)], []
         self.received += sum(map(len, frames))
         return [(frame, None) for frame in frames]
 

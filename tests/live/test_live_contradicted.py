@@ -123,7 +123,7 @@ def test_a_receiver_that_walks_off_leads_nobody_away(square, north_m_s):
 
 
 def test_landed_that_is_said_twice_a_second_in_flight_moves_nothing(square):
-    """983 estimates were sent up to 1.1 m off, and nobody was told."""
+    """983 estimates were sent up to 1.1 m off, without a warning."""
     found = square(said_beside(landed, BEGIN_S, END_S, 2.0))
     assert worst_m(found) < UNDISTURBED_M + 0.1
     assert Sensor.LANDED in found.session.offering.past_alarms

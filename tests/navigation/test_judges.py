@@ -110,9 +110,9 @@ def test_the_noise_of_a_fix_is_its_white_part_and_a_share_of_what_it_states():
     for axis in range(3):
         variance = pytest.approx(white[axis] ** 2 + 0.09 * (axis + 2) ** 2)
         assert judged_fix(fix, axis) == (axis + 1.0, variance, FUSED)
-    unsaid = reading(1.0, 2.0, 3.0)
+    no_velocity = reading(1.0, 2.0, 3.0)
     for axis, sigma in ((2, s.gps_velocity_white_down_m_s), (0, s.gps_velocity_white_m_s)):
-        assert judged_fix(unsaid, axis, position=False) == (axis + 1.0, pytest.approx(sigma**2), FUSED)
+        assert judged_fix(no_velocity, axis, position=False) == (axis + 1.0, pytest.approx(sigma**2), FUSED)
 
 
 def test_a_velocity_errs_by_what_a_receivers_lag_leaves_over_and_that_is_not_learnt_away():

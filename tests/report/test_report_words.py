@@ -1,4 +1,4 @@
-"""What a report calls things: a log by its file's name, north only where it is known, an error by its cause."""
+"""Names in a report: a log by its file's name, north only where it is known, an error by its cause."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ STANDING = Moving(0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, True, False, Fals
 
 
 def followed_through(contacts: list[bool], **changed: float):
-    """What is remembered after these epochs."""
+    """Memory after these epochs."""
     course, touch = nothing_yet(), no_touch()
     for epoch, touches in enumerate(contacts):
         course, touch = followed(course, touch, epoch, STANDING._replace(touches=touches, **changed))

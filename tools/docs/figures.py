@@ -66,7 +66,7 @@ def machine() -> str:
 
 
 def run(line: str) -> str:
-    """What a command prints, with the logs of $FLOWNAV_DATA. RuntimeError where it fails; flownav's 1 is a verdict."""
+    """Output of a command, with the logs of $FLOWNAV_DATA. RuntimeError where it fails; flownav's 1 is a verdict."""
     words = [word.replace(DATA, os.environ.get("FLOWNAV_DATA", DATA)) for word in shlex.split(line)]
     first = {"flownav": [sys.executable, "-m", "flownav"], "python": [sys.executable]}.get(words[0], words[:1])
     done = subprocess.run([*first, *words[1:]], cwd=PROJECT, stdout=subprocess.PIPE, text=True, check=False)

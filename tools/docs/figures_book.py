@@ -53,7 +53,7 @@ class Figure:
 
 @dataclass
 class Book:
-    """What docs/figures.json holds."""
+    """The content of docs/figures.json."""
 
     runs: dict[str, Run] = field(default_factory=dict)
     figures: dict[str, Figure] = field(default_factory=dict)

@@ -65,7 +65,7 @@ def last_change(paths: tuple[str, ...], folder: Path = PROJECT) -> str | None:
 
 
 def git(folder: Path, *arguments: str) -> str | None:
-    """What git prints; None where it fails, is not there, or where the folder is not the project's own clone."""
+    """Output of git; None where it fails, is not there, or where the folder is not the project's own clone."""
     if not (folder / ".git").exists():
         return None
     try:

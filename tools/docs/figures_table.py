@@ -112,7 +112,7 @@ STEP = re.compile(r"([^\[\].]+)|\[([^\]=]+)=([^\]]+)\]|\[(\d+)\]")
 
 
 def at(printed: Any, path: str) -> Any:
-    """What lies at a path of a JSON object. LookupError where nothing does."""
+    """The value at a path of a JSON object. LookupError where nothing does."""
     for name, key, value, number in STEP.findall(path):
         if name:
             printed = printed[name]

@@ -31,15 +31,15 @@ HEADINGS = (
 
 
 class Row(NamedTuple):
-    """One flight. level_m: protection level, median in flight; unsaid: share of the flight in which the error is beyond
-    it without a warning.
+    """One flight. level_m: protection level, median in flight; unwarned: share of the flight in which the error is
+    beyond it without a warning.
     """
 
     name: str
     ours: Line
     line: Line
     level_m: float
-    unsaid: float
+    unwarned: float
 
 
 def tables_of(log: Log) -> dict[str, Table]:
@@ -86,9 +86,9 @@ def row_of(name: str, log: Log) -> Row | None:
     stated, level = flown.estimate_rows, flown.estimate_rows.protection_m[:, 0]
     inside = (stated.t_s >= flight[0]) & (stated.t_s <= flight[1])
     warned = flagged(stated.t_s, flags_of(flown.written.event))
-    unsaid = unwarned_share(stated.t_s, level, warned, drift)
+    unwarned = unwarned_share(stated.t_s, level, warned, drift)
     ours, line = (line_of(path, truth, flight) for path in (estimate, reckoned(tables_of(log))))
-    return Row(name, ours, line, float(np.median(level[inside])), float(unsaid))
+    return Row(name, ours, line, float(np.median(level[inside])), float(unwarned))
 
 
 def rows_of(names: Sequence[str], paths: Sequence[Path]) -> list[Row]:
@@ -107,17 +107,17 @@ def rows_of(names: Sequence[str], paths: Sequence[Path]) -> list[Row]:
 def markdown(rows: Sequence[Row]) -> str:
     """The table, and its medians and worst."""
     lines = [HEADINGS, ("---", *["---:"] * (len(HEADINGS) - 1))]
-    lines += [(row.name, *_figures(*row.ours, *row.line, row.level_m, 100.0 * row.unsaid)) for row in rows]
+    lines += [(row.name, *_figures(*row.ours, *row.line, row.level_m, 100.0 * row.unwarned)) for row in rows]
     if rows:
-        figures = np.array([[*row.ours, *row.line, row.level_m, 100.0 * row.unsaid] for row in rows])
+        figures = np.array([[*row.ours, *row.line, row.level_m, 100.0 * row.unwarned] for row in rows])
         lines += [("**median**", *_figures(*np.median(figures, axis=0)))]
         lines += [("**worst**", *_figures(*figures.max(axis=0)))]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
 def _figures(*values: float) -> tuple[str, ...]:
-    end, most, heading, end_line, most_line, gyro, level, unsaid = values
+    end, most, heading, end_line, most_line, gyro, level, unwarned = values
     return (
         f"{end:.2f}", f"{most:.2f}", f"{heading:.1f}", f"{end_line:.2f}", f"{most_line:.2f}", f"{gyro:.1f}",
-        f"{level:.1f}", f"{unsaid:.1f}",
+        f"{level:.1f}", f"{unwarned:.1f}",
     )  # fmt: skip

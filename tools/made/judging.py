@@ -38,8 +38,8 @@ class Line(NamedTuple):
 class Verdict(NamedTuple):
     """One flight. path_m: how far it flew, level. ours, line: flownav and dead reckoning.
 
-    level_m: protection level, horizontal, median in flight. unsaid, warned: shares of the flight in which the error is
-    beyond it without a warning, and in which a warning stands. nis_flow, nis_range: mean squares of innovations over
+    level_m: protection level, horizontal, median in flight. unwarned, warned: shares of the flight in which the error
+    is beyond it without a warning, and in which a warning stands. nis_flow, nis_range: mean squares of innovations over
     what is stated, in flight. squares (3,): mean squares of the error over the stated one: position (north, east),
     velocity (forward, right), heading. signs: what went wrong first, and when after take-off [s]. why: of a flight that
     was refused.
@@ -51,7 +51,7 @@ class Verdict(NamedTuple):
     ours: Line
     line: Line
     level_m: float
-    unsaid: float
+    unwarned: float
     warned: float
     nis_flow: float
     nis_range: float

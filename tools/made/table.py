@@ -27,10 +27,10 @@ class Row(NamedTuple):
     """The result of some flights. drift_m: at the end; heading_deg likewise; ours, and those of dead reckoning (line).
 
     closer: share of flights in which flownav is at least as close. percent: median of the drift over the path, ours and
-    line. nis: means over flights, flow and range. level_m: median. unsaid: share of the flight beyond the level without
-    a warning; beyond: flights in which that ever happens. warned: share of the flight with a warning. over (3,): root
-    mean squares of the error over the stated one, over flights: position, velocity, heading. diverged: flights
-    beyond MOST_DRIFT_M or refused.
+    line. nis: means over flights, flow and range. level_m: median. unwarned: share of the flight beyond the level
+    without a warning; beyond: flights in which that ever happens. warned: share of the flight with a warning. over
+    (3,): root mean squares of the error over the stated one, over flights: position, velocity, heading. diverged:
+    flights beyond MOST_DRIFT_M or refused.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Row(NamedTuple):
     line_deg: Three
     nis: tuple[float, float]
     level_m: float
-    unsaid: float
+    unwarned: float
     beyond: int
     warned: float
     over: tuple[float, float, float]
@@ -77,8 +77,8 @@ def row_of(name: str, flights: Sequence[Verdict]) -> Row:
         line_deg=three([v.line.heading_deg for v in flights]),
         nis=(_mean(np.array([v.nis_flow for v in flights])), _mean(np.array([v.nis_range for v in flights]))),
         level_m=three([v.level_m for v in flights if np.isfinite(v.level_m)] or [np.nan]).median,
-        unsaid=float(np.mean([v.unsaid for v in flights])),
-        beyond=sum(v.unsaid > 0.0 for v in flights),
+        unwarned=float(np.mean([v.unwarned for v in flights])),
+        beyond=sum(v.unwarned > 0.0 for v in flights),
         warned=float(np.mean([v.warned for v in flights])),
         over=(*(float(np.sqrt(_mean(column))) for column in squares.T),),  # type: ignore[arg-type]
         diverged=sum(not v.ours.worst_m <= MOST_DRIFT_M for v in flights),
@@ -120,7 +120,7 @@ def failings(row: Row) -> list[str]:
     if row.diverged:
         found.append("diverges")
     if row.beyond:
-        found.append("unsaid")
+        found.append("unwarned")
     for name, value in zip(("NIS flow", "NIS range"), row.nis, strict=True):
         if not NIS_BAND[0] <= value <= NIS_BAND[1]:
             found.append(name)
@@ -163,7 +163,7 @@ def _trust(row: Row) -> tuple[str, ...]:
     headings = (row.ours_deg.median, row.ours_deg.p95, row.line_deg.median, row.line_deg.p95)
     return (
         row.name, *(f"{value:.1f}" for value in headings), *(f"{value:.2f}" for value in row.nis),
-        f"{row.level_m:.1f}", f"{100.0 * row.unsaid:.1f}", str(row.beyond), f"{100.0 * row.warned:.0f}",
+        f"{row.level_m:.1f}", f"{100.0 * row.unwarned:.1f}", str(row.beyond), f"{100.0 * row.warned:.0f}",
         *(f"{value:.2f}" for value in row.over),
         ", ".join(failings(row)) or "-",
     )  # fmt: skip

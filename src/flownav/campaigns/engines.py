@@ -201,8 +201,8 @@ _cells: dict[str, Ready] = {}  # of a worker: the last cell that it has flown
 
 
 def fly_part(shared: list[Any], key: str, seed: int, part: Part) -> Array:
-    """A part's rows, flown by a worker on one thread. told: the reference to the arguments from which `plan.ready_of`
-    makes a cell.
+    """A part's rows, flown by a worker on one thread. shared: the reference to the arguments from which
+    `plan.ready_of` makes a cell.
     """
     if key not in _cells:
         import ray

@@ -16,7 +16,7 @@ from flownav.live.filtering import Filtering
 from flownav.navigation.loop import Running
 
 RECENT_S = 1.0  # older words do not say where a navigator begins: chosen
-READINGS, ALIKE = 5, 4  # of the range; so many of them say the same: chosen, one spike is left out
+READINGS, ALIKE = 5, 4  # of the range; of which ALIKE agree: chosen, one spike is left out
 ALIKE_M = 0.3  # chosen, three times a range finder's noise at 8 m
 SAME_M = 1.0  # the range and the autopilot's own height: chosen, what its barometer drifts by in minutes
 WAITING_S = 1.0  # that a wrong range may still wait at the horizon (Options.most_horizon_s)

@@ -7,8 +7,8 @@ is neither calibrated nor, of some sensors, turned into the vehicle's axes. The 
     (S - 1) own - offset - bias,
 
 with PX4's calibration, a matrix S and an offset, which stand still, and EKF2's bias, which creeps. What the difference
-changes with the vehicle's attitude is S, and stays; what creeps since the start is EKF2's, and is put back. The two are
-told apart by recursive least squares: S is within SCALED_BY, and the bias moves by CREEPS in a second.
+changes with the vehicle's attitude is S, and stays; what creeps since the start is EKF2's, and is put back. Recursive
+least squares separate the two: S is within SCALED_BY, and the bias moves by CREEPS in a second.
 """
 
 import math

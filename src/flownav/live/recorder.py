@@ -126,7 +126,7 @@ class Recorder(Keeper):
     def finish(self, facts: dict[str, Any], *, received: bool = True) -> Finished:
         """Make the record, whole, and then remove the journal. `facts`: the session's own figures.
 
-        heard: a vehicle was received; without one there is nothing to keep, and no record is made.
+        received: a vehicle was received; without one there is nothing to keep, and no record is made.
         """
         if self._fed is not None:
             self._writer.take({"fed": self._fed})

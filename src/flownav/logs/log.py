@@ -94,7 +94,7 @@ INSTEAD = {
 
 
 def absences_of(streams: Mapping[Sensor, Stream], **phrases: str) -> Iterator[Absence]:
-    """The sensors that the streams lack. said: the reader's own text for `Absence.what`, by name of the sensor."""
+    """The sensors that the streams lack. phrases: the reader's own text for `Absence.what`, by name of the sensor."""
     for sensor, absence in INSTEAD.items():
         if sensor not in streams:
             alone = sensor == Sensor.ATTITUDE and Sensor.IMU not in streams

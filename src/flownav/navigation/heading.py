@@ -139,7 +139,7 @@ def judge_yaw(
 ) -> HeadingVerdict:
     """An external heading; before the start it is noted as the angle to north, as that of a level field is.
 
-    told: the filter's first heading is to be this one.
+    stated_apart: the filter's first heading is to be this one.
     """
     reason = usable_in_flight(reading, reading.value_0, 0.0, start.started)
     noted = stated_apart and start.started == 0.0 and is_received(reading) and bool(np.isfinite(reading.value_0))

@@ -160,8 +160,8 @@ def judge_motion(
     """The motion that moves the filter over the step to t_s, from the readings at its ends, the newest reading, or
     none.
 
-    arrived_now: an inertial reading is at hand; where none ever is, none stands for the step. After a gap it knows nothing of
-    the gap, which is coasted. Where no time passes there is no gap.
+    arrived_now: an inertial reading is at hand; where none ever is, none stands for the step. After a gap it knows
+    nothing of the gap, which is coasted. Where no time passes there is no gap.
     """
     m, spent, owed, before = memory
     started = start.started > 0.0

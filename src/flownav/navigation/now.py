@@ -57,7 +57,7 @@ POSE = (0, 1, 2, 6, 7, 8)  # of the nine: position and attitude
 
 class NowRow(NamedTuple, Generic[Value]):
     """The state at an instant, carried ahead_s seconds on by inertial readings. Body axes are forward, right, down.
-    status: of `progress.NOW_STATUSES`; the rest stands only where that is TOLD.
+    status: of `progress.NOW_STATUSES`; the rest stands only where that is FLOWNAV_TOLD.
 
     quaternion: body to earth, w first. rate_frd_rad_s: 0 where no inertial unit serves. Covariances are the upper
     triangles row by row: of north, east, down [m] and roll, pitch, yaw [rad]; of the velocity in earth's axes and in

@@ -37,7 +37,7 @@ from flownav.scoring.reference import Alignment, OutageError
 HORIZONTAL = (*GPS, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
 LONGEST_TABLE = 2000  # chosen: a replay each, hours of them
 FED_BEYOND = 2048  # readings at a time after the end of what is asked for, until an estimate lies beyond it
-COMPILED = "what a replay needs, once, about 20 s"  # as people are told while it is compiled
+COMPILED = "what a replay needs, once, about 20 s"  # the message while it is compiled
 LEAST_WINDOW_S = 1e-6  # what rounding leaves of a window is none
 
 

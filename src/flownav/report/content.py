@@ -142,7 +142,7 @@ def tiles(record: Record) -> list[Tile]:
 
 
 def _heading_limit(record: Record) -> str:
-    """What limits the heading of the navigator in simulation, as words to follow."""
+    """The limit of the navigator's heading in simulation, as words to follow."""
     ours = record.manifest.get("kind") == "fly" and record.manifest.get("filter") == "landing"
     return ", which only the compass shows in hover" if ours else ""
 

@@ -150,7 +150,8 @@ ANGLES = ("roll", "pitch", "yaw")
 def attitude_block(stated: Array, true: Array, counted: Array) -> Array:
     """STATISTICS of the errors of roll, pitch and yaw [deg] of a block of flights, (lanes, 3, 4).
 
-    said, true: quaternions body to earth (epochs, 4, lanes); counted (epochs, lanes) 0/1: the steps whose errors count.
+    stated, true: quaternions body to earth (epochs, 4, lanes); counted (epochs, lanes) 0/1: the steps whose errors
+    count.
     """
     apart = euler_deg(*np.moveaxis(stated, 1, 0)) - euler_deg(*np.moveaxis(true, 1, 0))
     within = np.ascontiguousarray(np.moveaxis(apart - 360.0 * np.rint(apart / 360.0), 0, 1))

@@ -226,7 +226,7 @@ def read_pad_camera(
 ) -> PadCameraReading:  # fmt: skip
     """One frame of a lens, its height that above the pad; image_rate_rad_s: of the ground below.
 
-    p: the camera as it is; told: as its datasheet has it.
+    p: the camera as it is; parameters: as its datasheet has it.
     """
     north_m, east_m, height_m, rotation = lens
     reach_m = reach_of(north_m, east_m, height_m)

@@ -41,8 +41,8 @@ class Aboard(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """taken: the next slot's number; following: that of the next reading that the navigator takes; heard: number of
-    inertial readings so far.
+    """taken: the next slot's number; following: that of the next reading that the navigator takes; inertial: number
+    of inertial readings so far.
     """
 
     taken: int

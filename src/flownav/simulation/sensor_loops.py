@@ -15,7 +15,7 @@ from flownav.simulation.truth import LATE, SENSOR_TABLE
 
 
 class SensorLoops(NamedTuple):
-    """A sensor's loops over lanes; start and heard are None where it has none."""
+    """A sensor's loops over lanes; start and after_reading are None where it has none."""
 
     sensor: SensorRow
     draw: OnLanes[..., Any]

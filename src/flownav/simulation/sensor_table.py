@@ -73,9 +73,9 @@ class SensorRow(NamedTuple):
 
     draw(n: Unit, p: Parameters) -> Unit; start(n: normals, p, ...) -> State, None where it has no state; step(state,
     unit, n: normals, p, inputs ...) -> (State, reading), or the reading, or a named tuple of records; see: laws that
-    return the inputs; says: in the order of their slots; heard: a law of the reading as it arrives, after a fault;
-    lever: the datasheet's table with the place of its lens; late: whether its readings may be later than its datasheet
-    says; phase: of its clock, in epochs.
+    return the inputs; says: in the order of their slots; after_reading: a law of the reading as it arrives, after a
+    fault; lever: the datasheet's table with the place of its lens; late: whether its readings may be later than its
+    datasheet says; phase: of its clock, in epochs.
     """
 
     name: str  # of its datasheet: in scenarios, dispersions, records and the names of its noise

@@ -177,8 +177,8 @@ def _door(entry: Entry, inner: str) -> str:
         "  %error = alloca ptr",
         f"  %status = call i32 @{inner}(ptr %result, ptr %error, {inside})",
         "  %good = icmp eq i32 %status, 0",
-        "  %said = select i1 %good, i32 0, i32 -1",
-        "  ret i32 %said",
+        "  %returned = select i1 %good, i32 0, i32 -1",
+        "  ret i32 %returned",
         "}\n",
     ])  # fmt: skip
 

@@ -38,8 +38,8 @@ class OnLanes(Protocol[Arguments, Result]):
 
 
 class _Kept(NamedTuple):
-    """How a record is loaded and stored. told: arguments of its access, such as which of several it is; buffer: the
-    name of the lane buffer in which it lies.
+    """How a record is loaded and stored. by_keyword: arguments of its access, such as which of several
+    it is; buffer: the name of the lane buffer in which it lies.
     """
 
     load: Callable[..., Any]

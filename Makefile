@@ -89,6 +89,7 @@ lint: $(VENV)/.ready-lint
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/python tools/words.py
 
 bench: $(VENV)/.ready-test
 	$(BIN)/flownav bench

@@ -1,6 +1,5 @@
 """A record in Rerun's viewer: the flight in space, its cameras, flow, errors and innovations on one time line."""
 
-import errno
 import os
 import sys
 import uuid
@@ -14,15 +13,15 @@ from flownav.export.trajectory import trajectories
 
 APPLICATION = "flownav"
 SUFFIX = ".rrd"
-HEADER, FOOTER, TAIL_BYTES = b"RRF2", b"RRF2FOOT", 12  # a file of that format begins and ends so
 NEEDED = "flownav view needs Rerun's package rerun-sdk: pip install 'flownav[view]'"
 
 
 class Prepared(NamedTuple):
-    """A recording with everything logged, how the viewer is laid out, and what a user should know, one line each."""
+    """A recording with everything logged, the viewer's layout, its bytes where they are kept in memory, and notes."""
 
     stream: Any
     blueprint: Any
+    memory: Any
     notes: list[str]
 
 
@@ -39,25 +38,10 @@ def write_rrd(record: Record, path: Path) -> list[str]:
     InputError where rerun-sdk is not installed or the record holds no path; OSError where nothing can be written.
     """
     _require_rerun()
+    prepared = _prepare(record, path.stem, kept=True)
     with written_whole(path) as temporary:
-        try:
-            prepared = _prepare(record, path.stem, to=temporary)
-            prepared.stream.flush()
-            prepared.stream.disconnect()
-        except RuntimeError as error:  # Rerun's, for whatever the system says
-            raise OSError(errno.EIO, f"Rerun: {str(error).splitlines()[0]}; is the disk full?", str(path)) from error
-        if not _is_whole(temporary):
-            raise OSError(errno.ENOSPC, "Rerun could not write all of it; is the disk full?", str(path))
+        temporary.write_bytes(prepared.memory.drain_as_bytes())
     return prepared.notes
-
-
-def _is_whole(path: Path) -> bool:
-    """Whether a file ends as Rerun ends one: where its last bytes cannot be written, it only logs that."""
-    with path.open("rb") as file:
-        if file.read(len(HEADER)) != HEADER:  # of a later Rerun, whose end is not known
-            return True
-        file.seek(max(os.fstat(file.fileno()).st_size - TAIL_BYTES, 0))
-        return FOOTER in file.read(TAIL_BYTES)
 
 
 def show(record: Record, name: str) -> list[str]:
@@ -85,8 +69,10 @@ def _require_rerun() -> None:
         raise InputError(NEEDED) from error
 
 
-def _prepare(record: Record, name: str, to: Path | None = None) -> Prepared:
-    """Log a record to a new recording, which streams into a file where one is given."""
+def _prepare(record: Record, name: str, *, kept: bool = False) -> Prepared:
+    """Log a record to a new recording. kept: in memory, whole, since a file that Rerun writes itself may be cut, or
+    never end, where the disk is full.
+    """
     paths = trajectories(record)
     import rerun as rr
 
@@ -95,9 +81,10 @@ def _prepare(record: Record, name: str, to: Path | None = None) -> Prepared:
 
     stream = rr.RecordingStream(APPLICATION, recording_id=str(uuid.uuid4()), send_properties=False)
     blueprint = arrangement(record, paths)
-    if to is not None:
-        stream.save(to, default_blueprint=blueprint)
+    memory = stream.memory_recording() if kept else None
+    if kept:
+        stream.send_blueprint(blueprint)
     stream.send_recording_name(name)
     log_scene(stream, record, paths)
     log_plots(stream, record, paths)
-    return Prepared(stream, blueprint, [note for path in paths for note in path.notes])
+    return Prepared(stream, blueprint, memory, [note for path in paths for note in path.notes])

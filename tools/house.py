@@ -33,6 +33,9 @@ def modules(source: Path = SOURCE) -> dict[str, Path]:
     return {".".join(names[:-1] if names[-1] == "__init__" else names): path for path, names in parts.items()}
 
 
+GENERATED = "calls"  # how loops are called (tools/calls.py): it imports for a type checker alone, and runs nothing
+
+
 def arrows(source: Path = SOURCE) -> set[Arrow]:
     """Every import of one module of the package by another."""
     known = modules(source)
@@ -40,7 +43,7 @@ def arrows(source: Path = SOURCE) -> set[Arrow]:
         Arrow(module, imported if imported in known else imported.rpartition(".")[0])
         for module, path in known.items()
         for imported in _imported(ast.parse(path.read_text(encoding="utf-8")))
-        if imported.split(".")[0] == source.name
+        if imported.split(".")[0] == source.name and module.rpartition(".")[2] != GENERATED
     }
 
 

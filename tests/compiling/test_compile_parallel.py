@@ -37,7 +37,7 @@ def apply(take, p):
 PROGRAM = """
 import os, sys
 import numpy as np
-from flownav.core.compile import announce_compilation, begin_beside, compile_beside, meanwhile
+from flownav.core.compile import announce_compilation, begin_in_parallel, compile_in_parallel, meanwhile
 from flownav.core.compiling import parallel
 from flownav.core.compiling.cache import STORE
 from parts import SHIFT, apply
@@ -47,11 +47,11 @@ sys.executable = os.environ.get("OTHER", sys.executable)
 p = np.array([3.0, 4.0])
 early = os.environ.get("BEGIN", "")
 if early:
-    begin_beside("parts", early)
-begun = list(beside._begun.values())
+    begin_in_parallel("parts", early)
+begun = list(parallel._begun.values())
 done = []
 with meanwhile(lambda: done.append("meanwhile")), announce_compilation("test", os.environ.get("FOR", "")):
-    compile_beside(SHIFT, apply, 0, p, whole=os.environ.get("WHOLE", ""))
+    compile_in_parallel(SHIFT, apply, 0, p, whole=os.environ.get("WHOLE", ""))
     made = "elsewhere" if not SHIFT.is_ready and STORE.holds(SHIFT.file_name()) else "here"
     apply(SHIFT.address, p)
 print(*p, made, *(done if early else ()), *("begun" for one in begun if one.poll() is not None))

@@ -83,7 +83,7 @@ def test_no_kernel_asks_for_a_function_of_the_c_library(used):
     asked = {(name, symbol) for name, code in used for symbol in asked_for(code)}
     assert asked == set()
     names = [name for name, _ in used]
-    assert {"feed_all", "_tell", "_release", "go_back", "put_error_statistics", "swing"} <= set(names)
+    assert {"feed_all", "_fill_now", "_release", "go_back", "put_error_statistics", "swing"} <= set(names)
     assert {"response", "film_of_stripes"} <= set(names)
     assert names.count("fly_block") >= 3
     assert names.count("take_one") == 4

@@ -146,4 +146,4 @@ def test_without_a_start_the_navigator_says_so():
 def test_the_command_prints_one_object_and_ends_with_0(tmp_path):
     done = run("faults", "--faults", "gps_jump", "--heights", "0.5", "--durations", "1", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert [row["fault"] for row in json.loads(done.stdout)["rows"]] == ["none", "gps_jump"]
+    assert [row["fault"] for row in json.loads(done.stdout)["rows"]] == ["none, pad camera", "none", "gps_jump"]

@@ -209,7 +209,7 @@ class Watched(Session):
     def tick(self, now_s: float) -> None:
         super().tick(now_s)
         if self.watching:
-            self.ages_s.append(self.vehicle_now_s() - self.hearing.newest_s)
+            self.ages_s.append(self.vehicle_now_s() - self.intake.newest_s)
 
 
 class Flight:

@@ -114,7 +114,7 @@ def silent_s(found, since_s, until_s):
     return max(later - before for before, later in pairwise(times))
 
 
-@pytest.mark.parametrize("north_m_s", [1.0, 2.0])
+@pytest.mark.parametrize("north_m_s", [2.0, 5.0])
 def test_a_receiver_that_walks_off_leads_nobody_away(square, north_m_s):
     """Its own velocity and the flow say that it does not: 4.8 m before, and sent at quality 69."""
     found = square(walking(north_m_s))
@@ -128,7 +128,6 @@ def test_landed_that_is_said_twice_a_second_in_flight_moves_nothing(square):
     assert worst_m(found) < UNDISTURBED_M + 0.1
     assert Sensor.LANDED in found.session.offering.past_alarms
     assert silent_s(found, BEGIN_S, LAST_S - 0.5) < 0.3
-    assert not found.session.dropped.get("gps_position: walks_off"), "a receiver that is right"
 
 
 def test_an_origin_of_another_town_and_a_gimbal_move_nothing(square):

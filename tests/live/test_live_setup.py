@@ -398,7 +398,7 @@ def test_the_command_prints_the_table_and_its_status_is_the_verdict(command):
     assert bad.exit_code == 1
     facts = json.loads(bad.output)
     found = next(entry for entry in facts["parameters"] if entry["name"] == "EKF2_EV_CTRL")
-    assert (found["has"], found["status"], found["set_to"]) == (0.0, "wrong", 5.0)
+    assert (found["has"], found["status"], found["set_to"]) == (0.0, "wrong", 7.0)
     assert facts["make"] == "PX4"
     assert not facts["fits"]
 

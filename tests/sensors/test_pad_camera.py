@@ -64,9 +64,9 @@ def read(
     lens: np.ndarray = LENS,
     rate: float = 0.0,
     p: PadCameraParameters = P,
-    told: PadCameraParameters | None = None,
+    parameters: PadCameraParameters | None = None,
 ) -> PadCameraReading:
-    return read_pad_camera(unit, pose(lens, ROTATION), rate, n, p, p if told is None else told)
+    return read_pad_camera(unit, pose(lens, ROTATION), rate, n, p, p if parameters is None else parameters)
 
 
 def test_a_perfect_camera_sees_where_the_pad_is() -> None:

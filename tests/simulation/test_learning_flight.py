@@ -58,7 +58,7 @@ def test_it_counts_the_epochs_of_a_stir_and_a_landing_waits_for_it():
         {"autopilot": FLIES._replace(away=1.0)},
         {"autopilot": FLIES._replace(pitch_sine=0.3)},
         {"autopilot": FLIES._replace(roll_sine=-0.3)},
-        {"said": HIGH._replace(pos_d_m=-0.9 + GAINS.pad_pos_d_m)},
+        {"stated": HIGH._replace(pos_d_m=-0.9 + GAINS.pad_pos_d_m)},
     ],
 )
 def test_on_the_skids_going_around_far_from_its_tilt_or_low_it_breaks_off_and_begins_anew(changed):
@@ -76,7 +76,7 @@ def test_on_the_skids_going_around_far_from_its_tilt_or_low_it_breaks_off_and_be
 
 def test_a_height_that_is_only_gps_is_no_height_to_break_off_for():
     low = HIGH._replace(pos_d_m=-0.5 + GAINS.pad_pos_d_m)
-    assert minded(NOTHING._replace(since=300.0), said=low, known=KNOWS._replace(ground_found=0.0)).learnt.tries == 0.0
+    assert minded(NOTHING._replace(since=300.0), stated=low, known=KNOWS._replace(ground_found=0.0)).learnt.tries == 0.0
 
 
 def test_it_is_given_up_after_a_minute_and_a_landing_waits_no_longer():

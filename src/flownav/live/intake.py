@@ -13,7 +13,6 @@ from flownav.live.origin import Origin
 from flownav.live.reception import Vehicle, sender_of
 from flownav.live.repeats import CONTENT, Repeats
 from flownav.live.vehicle_clock import VehicleClock
-from flownav.live.walking import Walking, fix_of
 from flownav.logs.mavlink.converted import Context, Dropped, Pose
 from flownav.logs.mavlink.framing import ARDUPILOT, PX4, Message
 from flownav.logs.mavlink.messages import instance_of, measurements
@@ -26,7 +25,6 @@ LONGEST_EXPOSURE_S = 0.2  # chosen: two periods of a PX4FLOW at 9.5 Hz; a longer
 GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
 REPEATED = "repeated"
 NOTHING = "no_data"  # six zeros: no vehicle neither turns nor feels anything, not even in free fall
-WALKS = "walks_off"  # a place that leaves its receiver's own velocity, beside flow that agrees with the IMU
 CROWDED = "crowded"  # closer together than any autopilot measures
 UNBIASED = "SCALED_IMU"
 LEAST_UNBIASED = 25  # readings by which its rate is known: chosen
@@ -53,8 +51,7 @@ class Intake:
         self.gps_received = self.flow_arrived = False
         self.flow_waited = 0  # flow readings that shared their estimate with a later one
         self._flow_s = NAN  # the vehicle's time of the last flow reading
-        self.repeats, self.inertial, self.field, self.walking = Repeats(), Inertial(), Field(), Walking()
-        self.flow_agrees = False  # with the inertial sensors, for long enough (anchor.Anchor)
+        self.repeats, self.inertial, self.field = Repeats(), Inertial(), Field()
         self._unbiased_s: deque[float] = deque(maxlen=LEAST_UNBIASED)
         self.swaps: deque[tuple[float, Source, str]] = deque()  # inertial sources that were found wrong, since when
 
@@ -65,7 +62,6 @@ class Intake:
         self.serving.clear()
         self.inertial.clear()
         self.field.clear()
-        self.walking.clear()
         self.sources.barred.clear()
         self._unbiased_s.clear()
         self.newest_s = self.since_s = NAN
@@ -108,14 +104,8 @@ class Intake:
         context = Context(vehicle.make == ARDUPILOT, by_autopilot, self.origin.navigator_deg_m, pose)
         if vehicle.make == PX4 and by_autopilot and message.msgname == UNBIASED:
             self.field.sensed(message, aligned.t_s)
-        outcomes = list(measurements(message, aligned.t_s, context))
-        fix = fix_of(outcomes) if not aligned.reason else None
-        walks = fix is not None and self.walking.take(*fix) and self.flow_agrees
-        for outcome in outcomes:
-            if walks and outcome.sensor == Sensor.GPS_POSITION:
-                self.counts[f"gps_position: {WALKS}"] += 1
-                self.serving.refused(outcome.sensor, aligned.t_s, WALKS)
-            elif isinstance(outcome, Dropped) or aligned.reason:
+        for outcome in measurements(message, aligned.t_s, context):
+            if isinstance(outcome, Dropped) or aligned.reason:
                 reason = outcome.reason if isinstance(outcome, Dropped) else aligned.reason
                 self.counts[f"{outcome.sensor.name.lower()}: {reason}"] += 1
             elif (

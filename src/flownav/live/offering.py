@@ -9,7 +9,7 @@ from flownav.live.beginning import ANEW, Beginning
 from flownav.live.filtering import Filtering, Keeper
 from flownav.live.horizon import Refused
 from flownav.live.inertial import Heights
-from flownav.live.intake import GPS, WALKS, Intake
+from flownav.live.intake import GPS, Intake
 from flownav.live.options import Limits
 from flownav.live.origin import Geodetic
 from flownav.live.vehicle_clock import VehicleClock
@@ -82,7 +82,6 @@ class Offering:
         self._begin(t_s)
         if self.filtering.running is not None:
             self.anchor.watch(self.filtering.running, t_s)
-        self.intake.flow_agrees = self.anchor.agrees(t_s)
         found = self.intake.serving.alarms(t_s, self.limits.unfused_s)
         for sensor in found.keys() - self.alarms.keys():
             spell = found[sensor]
@@ -97,8 +96,8 @@ class Offering:
 
     def _spoils(self, sensor: Sensor, t_s: float) -> bool:
         """Whether a sensor that does not serve keeps the estimate from being sent: any that gives the position,
-        but a GPS that is refused or walks off while the flow, which nobody doubts, agrees with the inertial sensors."""
-        refused = self.alarms[sensor].why in (Reason.INNOVATION_GATE.label, WALKS)
+        but a GPS that is refused while the flow, which nobody doubts, agrees with the inertial sensors."""
+        refused = self.alarms[sensor].why == Reason.INNOVATION_GATE.label
         return sensor in HORIZONTAL and not (sensor in GPS and refused and self.anchor.agrees(t_s))
 
     def judged(self, t_s: float, clock: VehicleClock, resets: int) -> tuple[str, Estimate | None]:

@@ -59,18 +59,8 @@ def words() -> dict[str, dict[str, str]]:
 
 FLOW_DELAYS = ("EKF2_OF_DELAY", "EK3_FLOW_DELAY")
 SOURCES = (
-    "EK3_SRC1_VELXY",
-    "EK3_SRC1_POSXY",
-    "EK3_SRC1_POSZ",
-    "EK3_SRC2_VELXY",
-    "EK3_SRC2_POSXY",
-    "EK3_SRC2_POSZ",
-    "EKF2_HGT_REF",
-    "EKF2_GPS_CTRL",
-    "EKF2_OF_CTRL",
-    "EKF2_RNG_CTRL",
-    "EKF2_AID_MASK",
-    "EKF2_HGT_MODE",
+    *(f"EK3_SRC{number}_{what}" for number in (1, 2) for what in ("VELXY", "POSXY", "POSZ")),
+    *(f"EKF2_{what}" for what in ("HGT_REF", "GPS_CTRL", "OF_CTRL", "RNG_CTRL", "AID_MASK", "HGT_MODE")),
 )
 REACH = ("RNGFND1_MAX", "RNGFND1_MAX_CM", *SOURCES)
 OFF_RANGE = ("terrain_step", "flow_scale", "baro_wash", "range_spikes")

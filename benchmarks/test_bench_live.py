@@ -150,7 +150,7 @@ def test_latency_from_flow_to_estimate(tmp_path, loaded):
     link.close()
     grown = memory_kb[-1] - memory_kb[len(memory_kb) // 10]
     print(f"\n{DURATION_S:g} s, {'both cores busy' if loaded else 'alone'}, scheduling: {scheduling}")
-    print(f"{session.hearing.readings[Sensor.FLOW_RATE]} flow readings, {session.sent} estimates sent")
+    print(f"{session.intake.readings[Sensor.FLOW_RATE]} flow readings, {session.sent} estimates sent")
     print("withheld:", dict(session.withheld), "dropped:", session.dropped, "link:", dict(link.counts))
     for name, found in (("reading", latency), ("arrival", link.since_arrival)):
         print(f"from its {name}: {_shown([found.quantile_s(share) for share in SHARES])}")

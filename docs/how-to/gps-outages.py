@@ -17,8 +17,9 @@ for outage in record.scores["outages"]:
 print(f"median {record.scores['outage_median_rms_m']:.2f} m, worst {record.scores['outage_worst_rms_m']:.2f} m")
 
 # %% [markdown]
-# `outage_table=(15, 85, 20)` replays the flight once for each window of 20 s between 15 and 85 s. The same in a
-# terminal is `flownav replay samples/flight-csv --outage-table 15:85:20`.
+# `outage_table=(15, 85, 20)` replays the flight once for each window of 20 s between 15 and 85 s; the last
+# one ends at 85 s and is shorter. The same in a terminal:
+# `flownav replay samples/flight-csv --outage-table 15:85:20`.
 #
 # ## What the sensors are worth
 #

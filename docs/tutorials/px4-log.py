@@ -75,7 +75,7 @@ plt.show()
 # %% [markdown]
 # ## Where to go from here
 #
-# - `flownav replay samples/flight.ulg --gps-outage 30:75` prints all of this in a terminal and writes a report.
+# - `flownav replay samples/flight.ulg --gps-outage 30:75` prints the drift in a terminal and writes a report.
 # - [Identify the sensor](flow-sensor.md): the drift above becomes smaller.
 # - [Outages in a row](../how-to/gps-outages.md): the median and the worst drift of a whole flight.
 # - [What is read of each log](../reference/logs.md)

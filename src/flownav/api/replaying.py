@@ -58,8 +58,8 @@ def replay(
     flow; flow_scale: factors on its two axes. gps_delay_s: how old a GPS reading is when it arrives. sensor: a flow
     sensor (its gains and latency correct the flow). settings: the filter's, by name or as a TOML file
     (docs/reference/keys.md). smooth: also the best estimate after the flight. outage_table: (t0, t1, length), one
-    replay for each window of that length, with GPS cut there alone. flow_instance: which of several flow sensors.
-    topics: of a ROS bag, which topic serves as what, by role (docs: ROS bags and MCAP).
+    replay for each window of that length (the last may be shorter), with GPS cut there alone. flow_instance: which of
+    several flow sensors. topics: of a ROS bag, which topic serves as what, by role (docs: ROS bags and MCAP).
     filter: one of your own in the navigator's place (docs: own parts).
     progress: called with 1 for each window of the table.
     InputError, one line, where the log or an option cannot serve. What is wrong with the log is in `record.verdict`.

@@ -30,7 +30,7 @@ OPTIONS = {
 if TYPE_CHECKING:
     app: typer.Typer
 COMMANDS = {  # by name, as the help lists them
-    "fly": "Fly a take-off or landing in closed loop, scored beside the paper.",
+    "fly": "Fly a mission, a take-off or a landing in simulation; table, record, report.",
     "replay": "Fuse a recorded flight; measure the drift without GPS.",
     "compare": "Many logs, many settings, beside dead reckoning and the autopilot.",
     "tune": "Propose settings from logs, judged on windows held out from the fit.",

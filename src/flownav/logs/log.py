@@ -100,6 +100,11 @@ def absences_of(streams: Mapping[Sensor, Stream], **phrases: str) -> Iterator[Ab
             alone = sensor == Sensor.ATTITUDE and Sensor.IMU not in streams
             instead = "nothing finds it without an IMU: the log cannot be replayed" if alone else absence.instead
             yield Absence(phrases.get(sensor.name.lower(), absence.what), instead)
+    if Sensor.GPS_POSITION in streams and Sensor.GPS_VELOCITY not in streams:
+        yield Absence(
+            phrases.get("gps_velocity", "no GPS velocity"),
+            "velocity comes from flow and inertial readings, and from how the GPS position moves",
+        )
     flow = streams.get(Sensor.FLOW_RATE)
     if flow is None and Sensor.FLOW_VELOCITY not in streams:
         yield Absence(phrases.get("flow_rate", "no optical flow"), "nothing but GPS holds the horizontal velocity")

@@ -105,6 +105,16 @@ def test_a_lying_accelerometer_does_not_move_a_scale_that_a_reference_shows():
     assert sign_of(flow_signs.scale(case)).figures["gain"] == pytest.approx(1.0, abs=0.03)
 
 
+@pytest.mark.parametrize("stretched", [0.6, 1.6])
+def test_a_reference_whose_scale_is_wrong_makes_no_wrong_flow_beside_gps_and_imu(stretched):
+    """A map of visual odometry without a scale, or a survey in feet: one witness alone names nothing."""
+    truth = {name: np.asarray(column) * (stretched if name.startswith(("pos_", "vel_")) else 1.0)
+             for name, column in yard().truth.items()}  # fmt: skip
+    found = sign_of(flow_signs.scale(Case(replace(yard(), truth=truth))))
+    assert found.strength < 0.5
+    assert found.figures["gain"] == pytest.approx(1.0, abs=0.05)
+
+
 def test_inav_has_one_factor_that_grows_with_the_gain():
     sign = Sign(2.0, (0.0, 1.0), {"gain": 0.8, "x": 0.8, "y": 0.8, "read": "0.80 of what it should"})
     (factor,) = flow_cures.scale(Case(Log(yard().path, {}, parameters={"opflow_scale": 12.0})), sign, "inav").settings

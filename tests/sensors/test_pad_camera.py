@@ -64,9 +64,9 @@ def read(
     lens: np.ndarray = LENS,
     rate: float = 0.0,
     p: PadCameraParameters = P,
-    parameters: PadCameraParameters | None = None,
+    datasheet: PadCameraParameters | None = None,
 ) -> PadCameraReading:
-    return read_pad_camera(unit, pose(lens, ROTATION), rate, n, p, p if parameters is None else parameters)
+    return read_pad_camera(unit, pose(lens, ROTATION), rate, n, p, p if datasheet is None else datasheet)
 
 
 def test_a_perfect_camera_sees_where_the_pad_is() -> None:
@@ -153,14 +153,14 @@ def test_a_larger_mark_round_it_serves_where_the_inner_does_not() -> None:
 def test_a_camera_that_is_worse_than_its_datasheet_states_the_datasheet() -> None:
     worse = P._replace(angle_floor_rad=3.0 * P.angle_floor_rad, distance_floor=2.0 * P.distance_floor)
     n = silent(PadCameraNormals, forward=1.0, distance=1.0)
-    assert read(n, p=worse, parameters=P)[3:6] == pytest.approx(read(n, p=P)[3:6], rel=0.05)
+    assert read(n, p=worse, datasheet=P)[3:6] == pytest.approx(read(n, p=P)[3:6], rel=0.05)
     assert abs(read(n, p=worse).tan_forward - read().tan_forward) > 2.5 * abs(read(n).tan_forward - read().tan_forward)
 
 
 def test_what_is_stated_holds_the_datasheets_bias() -> None:
     still = P._replace(boresight_rad=0.0, scale=0.0)
-    across, along = (np.array(read(parameters=P)[3:6]) - np.array(read(parameters=still)[3:6]))[[0, 2]]
-    assert across == pytest.approx(read(parameters=still).forward_variance * (P.boresight_rad / P.angle_floor_rad) ** 2)
+    across, along = (np.array(read(datasheet=P)[3:6]) - np.array(read(datasheet=still)[3:6]))[[0, 2]]
+    assert across == pytest.approx(read(datasheet=still).forward_variance * (P.boresight_rad / P.angle_floor_rad) ** 2)
     assert along == pytest.approx((P.scale * read().distance_m) ** 2)
 
 

@@ -222,11 +222,11 @@ def inner_serves(lens: LensPose, reach_m: float, p: PadCameraParameters) -> bool
 @equation
 def read_pad_camera(
     unit: PadCameraUnit, lens: LensPose, image_rate_rad_s: float, n: PadCameraNormals, p: PadCameraParameters,
-    parameters: PadCameraParameters,
+    datasheet: PadCameraParameters,
 ) -> PadCameraReading:  # fmt: skip
     """One frame of a lens, its height that above the pad; image_rate_rad_s: of the ground below.
 
-    p: the camera as it is; parameters: as its datasheet has it.
+    p: the camera as it is; datasheet: as its datasheet has it.
     """
     north_m, east_m, height_m, rotation = lens
     reach_m = reach_of(north_m, east_m, height_m)
@@ -256,7 +256,7 @@ def read_pad_camera(
     right = wrong_right if false else shrunk * fix.tan_right
     distance_m = wrong_m if false else (1.0 + unit.longer) * fix.distance_m
     there = 1.0 if false | found else 0.0
-    return stated_fix(unit, forward, right, distance_m, there, shown_m, image_rate_rad_s, parameters)
+    return stated_fix(unit, forward, right, distance_m, there, shown_m, image_rate_rad_s, datasheet)
 
 
 @equation
@@ -268,15 +268,15 @@ def stated_fix(
     there: float,
     shown_m: float,
     image_rate_rad_s: float,
-    parameters: PadCameraParameters,
+    datasheet: PadCameraParameters,
 ) -> PadCameraReading:
     """A fix (there: 1 where there is one) with the accuracy that the camera states of it; shown_m: the mark's reach."""
     noise, far = (
-        angle_noise(parameters, shown_m, image_rate_rad_s),
-        distance_noise(parameters, shown_m, image_rate_rad_s),
+        angle_noise(datasheet, shown_m, image_rate_rad_s),
+        distance_noise(datasheet, shown_m, image_rate_rad_s),
     )
-    across = unit.stated * np.sqrt(noise * noise + parameters.boresight_rad * parameters.boresight_rad)
-    along = unit.stated * np.sqrt(far * far + parameters.scale * parameters.scale) * distance_m
+    across = unit.stated * np.sqrt(noise * noise + datasheet.boresight_rad * datasheet.boresight_rad)
+    along = unit.stated * np.sqrt(far * far + datasheet.scale * datasheet.scale) * distance_m
     spread = across * across * (1.0 + forward * forward + right * right)
     return PadCameraReading(
         forward,

@@ -114,7 +114,7 @@ def referenced(case: Case) -> tuple[Interval, Interval] | None:
     if case.log.truth is None or case.measured is None:
         return None
     forward, right = case.measured.gains
-    known = all(sigma_of(gain) < KNOWN_TO * max(gain.value, 0.5) for gain in (forward, right))
+    known = all(gain.low > 0.0 and sigma_of(gain) < KNOWN_TO * max(gain.value, 0.5) for gain in (forward, right))
     return (right, forward) if known else None
 
 
@@ -124,11 +124,11 @@ def sigma_of(interval: Interval) -> float:
 
 
 def gains(case: Case) -> list[tuple[float, float]]:
-    """The flow's gain and its standard error by each witness that knows it to a tenth; a position reference alone."""
+    """The flow's gain and its standard error by each witness that knows it to a tenth: reference, IMU, GPS."""
     found = []
     reference = referenced(case)
     if reference is not None:
-        return [(gain.value, sigma_of(gain)) for gain in reference]
+        found.append((0.5 * sum(gain.value for gain in reference), max(map(sigma_of, reference))))
     if case.flow_fit is not None and case.expectation_reliability > LEAST_RELIABLE:
         gain, sigma = gain_of(case.flow_fit, uneven=_uneven(case) != 1.0)
         found.append((gain / case.expectation_reliability, float(np.hypot(sigma, MODEL_SIGMA))))
@@ -161,19 +161,11 @@ def scale(case: Case) -> Found:
     found = gains(case)
     if not found:
         return Lack("too little motion against a reference to know the flow's scale to a tenth")
-    reference = referenced(case)
-    if reference is not None:
-        x, y, sigma = *(gain.value for gain in reference), max(map(sigma_of, reference))
-        if abs(np.log(x / y)) < UNEVEN_SIGMA * sigma * (1.0 / x**2 + 1.0 / y**2) ** 0.5:
-            x = y = float((x * y) ** 0.5)
-        gain = float((x * y) ** 0.5)
-    else:
-        gain, sigma = _agreed(found)
-        uneven = _uneven(case)
-        x, y = gain * uneven**0.5, gain / uneven**0.5
+    gain, sigma = _agreed(found)
+    uneven = _uneven(case)
+    x, y = gain * uneven**0.5, gain / uneven**0.5
     off = max(*(abs(np.log(one)) - sigma / one for one in (gain, x, y)), 0.0)
-    if reference is None:
-        off = min(off, *_lasting(case))
+    off = min(off, *_lasting(case))
     figures: dict[str, float | str] = {"gain": gain, "x": x, "y": y, "sigma": sigma, "read": _read(gain, x, y)}
     return Sign(off / SCALE_OFF, case.flight_s, figures, (expected_picture(case),))
 
@@ -204,8 +196,14 @@ def _agreed(found: list[tuple[float, float]]) -> tuple[float, float]:
 
 
 def _uneven(case: Case) -> float:
-    """The gain of x over that of y by the inertial readings; 1 where they do not differ, or are not known apart."""
-    fit = case.flow_fit
+    """The gain of x over that of y, by a position reference, else by the inertial readings; 1 where they do not differ,
+    or are not known apart.
+    """
+    reference, fit = referenced(case), case.flow_fit
+    if reference is not None:
+        ratio = reference[0].value / reference[1].value
+        sigma = float(np.sqrt(sum((sigma_of(gain) / gain.value) ** 2 for gain in reference)))
+        return ratio if abs(np.log(ratio)) > UNEVEN_SIGMA * sigma else 1.0
     if fit is None or _significance(fit) < 2.0 * SIGNIFICANT or case.expectation_reliability < LEAST_RELIABLE:
         return 1.0
     angle, _, mirrored = turn_of(fit.matrix)
@@ -213,7 +211,7 @@ def _uneven(case: Case) -> float:
     if mirrored or abs(angle) > TURN_RAD or min(x, y) < 0.05:
         return 1.0
     error = float(np.hypot(fit.sigma[0, 0] / x, fit.sigma[1, 1] / y))
-    return float(x / y) if abs(np.log(x / y)) > np.log(UNEVEN) + 3.0 * error else 1.0
+    return float(x / y) if abs(np.log(x / y)) > np.log(UNEVEN) + UNEVEN_SIGMA * error else 1.0
 
 
 def _read(gain: float, x: float, y: float) -> str:
@@ -295,8 +293,16 @@ def gyro(case: Case) -> Found:
         "x": float(fit.matrix[0, 0]), "y": float(fit.matrix[1, 1]), "bias_deg_s": float(np.degrees(np.abs(bias).max()))
     }  # fmt: skip
     worst = int(np.argmax(np.abs(np.diag(fit.matrix) - 1.0) + np.abs(bias) / 0.1))
-    picture = Picture("turning (rad/s)", (
-        Trace("estimate", "the vehicle's", flow.t_s, rates[:, worst]),
-        Trace("flow", "the flow sensor's gyro", flow.t_s, flow.value[:, 2 + worst]),
-    ), f"About {'xy'[worst]}: both see the same vehicle.")  # fmt: skip
-    return Sign(strength, case.flight_s, figures, (picture,))
+    return Sign(strength, case.flight_s, figures, (gyros_picture(case, worst, fit.lag_s),))
+
+
+def gyros_picture(case: Case, axis: int, lag_s: float) -> Picture:
+    """The vehicle's gyro and the flow sensor's about one axis, 0 or 1, at the flow's instants [rad/s]."""
+    assert case.flow is not None
+    assert case.rates is not None
+    flow = case.flow
+    rates = np.interp(flow.t_s - lag_s, case.rates[0], case.rates[1][:, axis])
+    return Picture("turning (rad/s)", (
+        Trace("estimate", "the vehicle's", flow.t_s, rates),
+        Trace("flow", "the flow sensor's gyro", flow.t_s, flow.value[:, 2 + axis]),
+    ), f"About {'xy'[axis]}: both see the same vehicle.")  # fmt: skip

@@ -5,7 +5,7 @@ The first needs the sensor's own gyro and no reference; the second a position re
 
 from flownav.lab.identification.quantities import Interval
 from flownav.studies.explain.case import Case
-from flownav.studies.explain.flow_signs import NO_FLOW, NO_RATES, gains
+from flownav.studies.explain.flow_signs import NO_FLOW, NO_RATES, gains, gyros_picture
 from flownav.studies.explain.sign import Found, Lack, Picture, Sign, Trace, nothing
 
 TIME_OFF = 0.22  # of the logarithm of a factor, beyond its interval: as of the flow's scale
@@ -30,23 +30,12 @@ def interval(case: Case) -> Found:
         "stated": "long" if slope.value < 1.0 else "short",
     }  # fmt: skip
     strength = 1.0 + beyond_one(slope) / TIME_OFF
-    return Sign(strength, case.flight_s, figures, (gyros_picture(case, turned.lag_s),))
+    return Sign(strength, case.flight_s, figures, (gyros_picture(case, 0, turned.lag_s),))
 
 
 def beyond_one(slope: Interval) -> float:
     """How far the nearer end of an interval lies from 1, as a share of it; 0 where the interval holds 1."""
     return max(1.0 - slope.high, slope.low - 1.0, 0.0)
-
-
-def gyros_picture(case: Case, lag_s: float) -> Picture:
-    """Both gyros about x, at one time [rad/s]."""
-    assert case.flow is not None
-    assert case.rates is not None
-    t_s, rates = case.rates
-    return Picture("turning about x (rad/s)", (
-        Trace("estimate", "the vehicle's gyro", t_s + lag_s, rates[:, 0]),
-        Trace("flow", "the flow sensor's gyro", case.flow.t_s, case.flow.value[:, 2], dots=True),
-    ), "Both turn with one body: one is the other times a factor.")  # fmt: skip
 
 
 def offset(case: Case) -> Found:

@@ -53,7 +53,7 @@ plt.show()
 # %%
 smooth = flownav.replay("samples/flight-csv", gps_outages=[(30, 50)], smooth=True)
 for name, scores in (("in flight", smooth.scores), ("afterwards", smooth.scores["smoothed"])):
-    truth = scores["truth"]  # this log has one; scores["outages"] are against GPS, which errs itself
+    truth = scores["truth"]  # over the whole flight, GPS's own slow error with it
     print(f"{name:10s} {truth['horizontal_rms_m']:.2f} m rms, {truth['horizontal_max_m']:.2f} m at most")
 
 # %% [markdown]

@@ -83,10 +83,8 @@ def test_each_log_has_its_estimators_and_each_row_its_keys(garden, hall):
 
 def test_a_log_with_gps_whole_says_what_its_place_shows(garden):
     whole = " ".join(call(garden, "--outages", "15:35:10").stdout.split())
-    assert "--outages T0:T1:LENGTH cuts GPS" not in whole
-    uncut = " ".join(call(garden).stdout.split())
-    assert "receiver's own slow error" in uncut
-    assert "--outages T0:T1:LENGTH cuts GPS and shows the drift without it." in uncut
+    assert "receiver's own slow error" in whole
+    assert "The columns cut do: the rms drift through 10 s without GPS." in whole
 
 
 def test_a_log_with_nothing_to_hold_it_against_says_so(hall, tmp_path):
@@ -156,13 +154,21 @@ def test_figures_and_dashes_stand_under_their_headings():
 
 
 @pytest.mark.parametrize(("span", "first", "count"), [
-    ((0.0, 848.9), 60.0, 12), ((-0.016, 702.1), 60.0, 9), ((1000.4, 1200.0), 1060.0, 1), ((0.0, 179.9), 0.0, 0),
+    ((0.0, 848.9), 60.0, 12), ((-0.016, 702.1), 60.0, 9), ((1000.4, 1200.0), 1060.0, 1),
 ])  # fmt: skip
 def test_the_usual_cuts_are_whole_minutes_inside_the_flight(span, first, count):
     windows = default_windows(span)
     assert len(windows) == count
     assert all(t1 - t0 == 60.0 and t1 <= span[1] - 60.0 for t0, t1 in windows)
     assert not windows or windows[0][0] == first
+
+
+@pytest.mark.parametrize(("span", "windows"), [
+    ((0.0, 179.9), [(36.0, 89.0), (89.0, 142.0)]), ((0.2, 100.0), [(20.0, 50.0), (50.0, 80.0)]),
+    ((500.0, 534.0), [(507.0, 517.0), (517.0, 527.0)]), ((0.0, 30.0), []), ((0.0, 0.0), []),
+])  # fmt: skip
+def test_a_short_flight_is_cut_twice_in_its_middle(span, windows):
+    assert default_windows(span) == windows
 
 
 def test_logs_of_one_name_are_told_apart():

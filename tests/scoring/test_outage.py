@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flownav.scoring.path import Path, References, outage_of
 from flownav.scoring.reference import difference_at, horizontal_rms, outage_error
 
 T_S = np.arange(0.0, 20.0, 0.1)
@@ -49,3 +50,51 @@ def test_nothing_is_said_outside_the_estimates_time():
     assert error == pytest.approx(np.array([[6.1, -3.05], [39.7, -19.85]]))
     assert len(difference_at(np.zeros(0), np.zeros((0, 2)), reference_t_s, np.zeros((4, 2)))) == 0
     assert np.isnan(horizontal_rms(T_S, STRAIGHT, np.array([99.0]), np.zeros((1, 2))))
+
+
+# -- against the truth ----------------------------------------------------------------------------------------
+AWAY = np.array([3.0, -7.0])
+TURN = np.array([[0.6, 0.8], [-0.8, 0.6]])  # the truth's own north is turned by 53 degrees
+
+
+def weaving(t_s: np.ndarray) -> np.ndarray:
+    """North and east of a path that shows its heading, (n, 2) [m]."""
+    return np.column_stack([8.0 * np.sin(0.4 * t_s), 5.0 * np.cos(0.3 * t_s)])
+
+
+def known(truth_ne: np.ndarray | None, truth_t_s: np.ndarray, gps_walk_m_s: float) -> References:
+    fixes_t_s = np.arange(0.5, 20.0, 0.2)
+    walked = weaving(fixes_t_s - 0.3) + np.column_stack([gps_walk_m_s * fixes_t_s, np.zeros(len(fixes_t_s))])
+    truth = None if truth_ne is None else {
+        "t_s": truth_t_s, "pos_n_m": truth_ne[:, 0], "pos_e_m": truth_ne[:, 1], "pos_d_m": np.zeros(len(truth_t_s)),
+    }  # fmt: skip
+    return References((fixes_t_s, np.column_stack([walked, np.zeros(len(walked))])), None, 0.3, (), truth, "capture")
+
+
+def flown(drift_m_s: float) -> Path:
+    """A path that drifts north between 5 and 15 s, as GPS cut from 5.3 to 15.3 s on leaves it, and is right after."""
+    away = drift_m_s * np.clip(T_S - 5.0, 0.0, 10.0) * (T_S < 15.0)
+    position = np.column_stack([weaving(T_S), np.zeros(len(T_S))]) + np.column_stack([away, 0.0 * T_S, 0.0 * T_S])
+    return Path(T_S, position, np.full((len(T_S), 2), np.nan))
+
+
+def test_where_a_log_has_a_truth_the_slow_error_of_gps_is_no_drift():
+    truth_t_s = np.arange(0.0, 19.9, 0.05)
+    truth = (weaving(truth_t_s) + AWAY) @ TURN
+    found = outage_of(flown(0.0), known(truth, truth_t_s, 0.2), 5.3, 15.3)
+    assert found.horizontal_max_m < 0.01  # of the path's samples, 0.1 s apart
+    against_gps = outage_of(flown(0.0), known(None, truth_t_s, 0.2), 5.3, 15.3)
+    assert against_gps.horizontal_max_m == pytest.approx(0.2 * 9.4, abs=0.15)
+
+
+def test_drift_against_a_truth_is_that_of_the_cut_alone():
+    """The cut begins and ends with the instants that GPS describes: what GPS mends behind it does not count."""
+    truth_t_s = np.arange(0.0, 19.9, 0.05)
+    found = outage_of(flown(0.1), known((weaving(truth_t_s) + AWAY) @ TURN, truth_t_s, 0.2), 5.3, 15.3)
+    assert found.horizontal_max_m == pytest.approx(0.1 * 10.0, abs=0.12)  # less what turning takes for its own
+    assert found.horizontal_rms_m == pytest.approx(0.1 * 10.0 / np.sqrt(3.0), abs=0.1)
+
+
+def test_an_outage_without_any_reference_is_an_error():
+    with pytest.raises(ValueError, match="against a truth or GPS"):
+        outage_of(flown(0.0), References(), 5.0, 15.0)

@@ -54,12 +54,14 @@ def fly(
     """Fly a scenario once, in closed loop, and score the flight.
 
     scenario: sortie (the whole mission, by default), takeoff, landing, gusty, pad_return, approach, a TOML file or a
-    Scenario. seed, flight: flight k of a seed is always the same flight, to the bit. filter: "landing" (the navigator,
+    Scenario. seed: of all noise. flight: the number of the flight, flight k of a seed being always the same to the bit;
+    or a mapping of the scenario's table of that name: `flight={"duration_s": 6.0}`. filter: "landing" (the navigator,
     by default), "paper", or a filter of your own: its class, an object, an entry point's name or "file.py:Class" (docs:
     own parts); likewise sensors, each in place of ours of its kind, and controller. vehicle: a shipped one's name, a
     file, a Vehicle or a vehicle of your own. dispersed: vehicle, wind and sensors are drawn for this flight, and
     neither navigator nor autopilot knows how; else they are what is believed. progress: called with 1 when it is down.
-    changes: other values for the scenario's own keys, as `Scenario.changed` takes them (docs/reference/scenarios.md).
+    changes: other values for the scenario's own keys, as `Scenario.changed` takes them (docs/reference/scenarios.md):
+    `wind=8` or `wind="8:270"` (m/s at 20 ft, from the west), `gps="midg"`, `wind={"speed_20ft_m_s": 4.0}`.
     InputError, one line, for a name, a key or a value that cannot be. What a flight crashes on is in `record.verdict`.
 
     Example:

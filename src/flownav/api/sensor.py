@@ -83,6 +83,8 @@ class Sensor:
     def latency_s(self) -> Valued:
         """Delay of slow motion [s], with its 95 % interval where it was identified.
 
+        Where `verdict` does not report the latency, the log's motion does not show it: do not build on the value.
+
         Example:
             >>> 0.0 < flownav.Sensor.load().latency_s.value < 0.5
             True
@@ -185,7 +187,9 @@ flownav.identify found; identify it anew
         return self.path or kept_file(self.name, self.entries)
 
     def __repr__(self) -> str:
-        gain, latency = _shown(self.gain, 1.0, 3, ""), _shown(self.latency_s, 1e3, 0, " ms")
+        gain, found = _shown(self.gain, 1.0, 3, ""), self.file.identification
+        unseen = found is not None and found.identifiable < 2  # the gain alone
+        latency = "not shown by its log" if unseen else _shown(self.latency_s, 1e3, 0, " ms")
         return f"<Sensor {self.name}: gain {gain}, latency {latency}>"
 
 

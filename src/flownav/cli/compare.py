@@ -24,8 +24,8 @@ SHORT = (
     "cut [m]\nworst",
 )  # fmt: skip
 WITH_GPS = (
-    "With GPS, place and end show how far the receiver's own slow error carried each estimate, not what flow is worth: "
-    "--outages T0:T1:LENGTH cuts GPS and shows the drift without it."
+    "With GPS, place and end show how far the receiver's own slow error carried each estimate, not what flow is worth. "
+    "The columns cut do: the rms drift through {length} s without GPS."
 )
 TITLE = "rms errors where all estimators of a log have rows; end drift; GPS cuts"
 
@@ -33,7 +33,7 @@ TITLE = "rms errors where all estimators of a log have rows; end drift; GPS cuts
 LOGS = f"Logs, each {options.LOG_KINDS}; or two and more records."
 WITH = f"Settings of the navigator, or `{DEFAULT}`; may be repeated."
 WINDOWS = "Windows of LENGTH from T0 to T1 [s] in which GPS is withheld."
-MINUTES = "whole minutes of the flight"
+MINUTES = "whole minutes of the flight; two cuts of a short one"
 
 
 def command(
@@ -147,8 +147,9 @@ def _show(rows: list[dict[str, Any]], written: dict[str, str]) -> None:
         shown.add_row(f"  {estimator}", *figures)
         log = name
     say(shown)
-    if any(row["against"] for row in rows) and all(row["outages"]["median_m"] is None for row in rows):
-        say(WITH_GPS)
+    cut_s = sorted({cut["t1"] - cut["t0"] for row in rows for cut in row["outages"]["windows"]})
+    if cut_s:
+        say(WITH_GPS.format(length=" to ".join(f"{length:g}" for length in dict.fromkeys((cut_s[0], cut_s[-1])))))
     say_files(written, written)
 
 

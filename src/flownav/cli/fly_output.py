@@ -21,7 +21,7 @@ MOTIONS = (
 UNITS = {"x": "m", "y": "m", "z": "m", "u": "m/s", "v": "m/s", "w": "m/s"}
 RECEIVERS = {"midg": "GPS of 2 m CEP", "white": "GPS with white noise"}
 HEADING = "heading  only the compass shows it in hover; GPS corrects it in fast flight"  # what limits it
-PARTS = {"estimate": "navigation", "guidance": "steering", "pad": "the pad's place"}  # of a touchdown's distance
+PARTS = {"estimate": "estimate", "guidance": "guidance", "pad": "pad's place"}  # of a touchdown's distance
 
 
 def show(facts: dict[str, Any], manifest: Mapping[str, Any], median: int) -> None:
@@ -131,7 +131,7 @@ def _many_lines(landing: dict[str, Any], flights: int) -> list[str]:
     limited = landing["limited_by"]
     if limited is not None:
         parts = [f"{words} {figure(limited[f'{name}_m'], '.3f')} m" for name, words in PARTS.items()]
-        lines.append(f"of the distance, in 95 % of the flights at most  {', '.join(parts)}")
+        lines.append(f"parts of the distance (they add as vectors), in 95 % of the flights at most  {', '.join(parts)}")
     return lines
 
 
@@ -189,7 +189,7 @@ def _percentiles(percentiles: dict[str, Any]) -> str:
         for name in ("std", "mean")
     )
     largest = f"{percentiles['max_position_error_m']:.0f}"
-    return f"the paper's flight lies at our percentile: largest error {largest}; std {std}; |mean| {mean}"
+    return f"% of our flights that err less than the paper's: largest error {largest}; std {std}; |mean| {mean}"
 
 
 def _cell(number: Any, digits: int) -> str:

@@ -131,7 +131,9 @@ def show(record: Record, scores: dict[str, Any], *, verbose: bool = False) -> No
     """Print the figures for people."""
     say(f"{record.manifest['log']}: {scores['duration_s']:.1f} s")
     if scores["outages"]:
-        say(table_of(OUTAGE_COLUMNS, scores["outages"], title="Horizontal error through GPS outages"))
+        against = (scores.get("truth") or {}).get("reference", "GPS")
+        title = f"Horizontal drift through GPS outages, against {against}"
+        say(table_of(OUTAGE_COLUMNS, scores["outages"], title=title))
     say(*error_lines(scores))
     say(*_sensors(scores, verbose=verbose))
     rejected = _rejected(scores)

@@ -63,9 +63,10 @@ def summary(record: Record) -> str:
         worst = max(cut, key=series.rms_m)
         among = f", the worst of {len(cut)} outages," if len(cut) > 1 else ""
         rms, largest = number(worst.get("horizontal_rms_m"), 2), number(worst.get("horizontal_max_m"), 2)
+        against = series.truth_name(record) if scores.get("truth") else "GPS"
         sentences.append(
             f"With GPS withheld from {worst['t0']:g} to {worst['t1']:g} s{among} the position drifted "
-            f"{rms} m rms and {largest} m at most."
+            f"{rms} m rms and {largest} m at most, against {against}."
         )
     truth = mapping(scores.get("truth"))
     if truth:

@@ -94,10 +94,18 @@ def path_scores(estimate: Mapping[str, Column], known: References) -> dict[str, 
 
 
 def outage_of(path: Path, known: References, t0: float, t1: float) -> OutageError:
-    """The outage error over a window. ValueError without GPS."""
-    if known.fixes is None:
-        raise ValueError("an outage is scored against GPS, and there is none")
-    t_s, value = known.fixes
+    """The outage error over a window.
+
+    It is against the log's truth, turned onto the estimate and taken at the instants that GPS would describe, or
+    against GPS, whose own slow errors count as drift, where there is no truth. ValueError without either.
+    """
+    placed, truth = truth_alignment(path, known.truth), known.truth
+    if placed is not None and truth is not None:
+        t_s, value = np.asarray(truth["t_s"], float) + known.gps_delay_s, placed.turned(columns_of(truth, POSITION_NED))
+    elif known.fixes is not None:
+        t_s, value = known.fixes
+    else:
+        raise ValueError("an outage is scored against a truth or GPS, and there is neither")
     return outage_error(path.t_s, path.position[:, :2], t_s, value[:, :2], known.gps_delay_s, t0, t1)
 
 

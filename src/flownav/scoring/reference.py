@@ -1,8 +1,8 @@
 """An estimate against a reference: laid on it, through an outage, from take-off to the end, and against its levels.
 
-The outage error is defined once, here: horizontal position of the estimate minus the GPS position, taken at the
-instant that the GPS sample describes (its time less the GPS delay), less its mean over the first five GPS
-samples of the window; rms and maximum over the window. GPS noise puts a floor under it.
+The outage error is defined once, here: horizontal position of the estimate minus that of the reference (the truth
+where a log has one, else GPS), taken at the instant that the sample describes (its time less the GPS delay), less its
+mean over the first five samples of the window; rms and maximum over the window. GPS noise puts a floor under it.
 """
 
 from typing import Any, NamedTuple
@@ -88,7 +88,7 @@ def outage_error(
     """The outage error of one window.
 
     estimate_t_s (n,), estimate_ne_m (n, 2): the estimate; gps_t_s (m,), gps_ne_m (m, 2): all GPS samples at
-    their arrival, withheld or not.
+    their arrival, withheld or not, or a truth as a receiver without error would have brought it.
     """
     inside = (gps_t_s >= t0) & (gps_t_s < t1)
     error = difference_at(estimate_t_s, estimate_ne_m, gps_t_s[inside] - delay_s, gps_ne_m[inside])

@@ -4,6 +4,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from flownav.core.errors import InputError
 from flownav.core.files import natural_order
 from flownav.core.measurement import Sensor
@@ -16,8 +18,9 @@ from flownav.replays.fed import as_fed
 from flownav.replays.judged import airborne_of
 from flownav.replays.prepare import FLOW, ReplayOptions, check_windows
 from flownav.replays.session import Replay, outage_summary, outage_table, replay
-from flownav.scoring.path import References, end_drift_of, outage_entry
-from flownav.scoring.reference import OutageError, outage_error
+from flownav.scoring.path import Path as ScoredPath
+from flownav.scoring.path import References, end_drift_of, outage_entry, outage_of
+from flownav.scoring.reference import OutageError
 from flownav.studies.compare.tracks import (
     Reference,
     Track,
@@ -33,6 +36,8 @@ from flownav.studies.compare.tracks import (
 FLOWNAV, DEAD_RECKONING, AUTOPILOT = "flownav", "dead reckoning", "autopilot"
 WINDOW_S = 60.0
 SETTLED_S = 60.0  # after the log's start and before its end nothing is cut
+SHORT_CUTS, SHORT_SETTLED = 2, 0.2  # of a log too short for that: cuts, and the share of it before and after them
+LEAST_CUT_S = 10.0
 
 HEADINGS = (
     "log", "estimator", "against", "horizontal [m]", "in flight [m]", "velocity [m/s]", "in flight [m/s]",
@@ -95,10 +100,17 @@ def _outages(errors: Sequence[OutageError]) -> Row:
 
 
 def default_windows(span_s: Window) -> list[Window]:
-    """Whole windows of WINDOW_S, from SETTLED_S after the log's start (to the second) to SETTLED_S before its end."""
-    first, last = round(span_s[0]) + SETTLED_S, span_s[1] - SETTLED_S
-    count = max(int((last - first) // WINDOW_S), 0)
-    return [(first + k * WINDOW_S, first + (k + 1) * WINDOW_S) for k in range(count)]
+    """Whole windows of WINDOW_S, from SETTLED_S after the log's start (to the second) to SETTLED_S before its end.
+
+    Of a log too short for one: SHORT_CUTS windows of whole seconds, after SHORT_SETTLED of its time and as long before
+    its end; none where they would be shorter than LEAST_CUT_S.
+    """
+    start, end = float(round(span_s[0])), span_s[1]
+    count, length, first = int((end - start - 2.0 * SETTLED_S) // WINDOW_S), WINDOW_S, start + SETTLED_S
+    if count < 1:
+        aside = float(round(SHORT_SETTLED * (end - start)))
+        count, length, first = SHORT_CUTS, float((end - start - 2.0 * aside) // SHORT_CUTS), start + aside
+    return [(first + k * length, first + (k + 1) * length) for k in range(count)] if length >= LEAST_CUT_S else []
 
 
 def names_of(paths: Sequence[Path]) -> list[str]:
@@ -179,15 +191,11 @@ def compare_log(
 
 def _reckoned(flown: Replay, windows: list[Window]) -> list[Entrant]:
     """Dead reckoning on the streams as they were fed, where there is flow with a height; GPS it never had."""
-    log, delay_s = flown.log, flown.options.gps_delay_s
     track = dead_reckoning_of(flown)
     if track is None:
         return []
-    gps = log.streams.get(Sensor.GPS_POSITION)
-    cuts = [] if gps is None else [
-        outage_error(track.t_s, track.motion.position[:, :2], gps.t_s, gps.value[:, :2], delay_s, *window)
-        for window in windows
-    ]  # fmt: skip
+    path = ScoredPath(track.t_s, track.motion.position, np.full((len(track.t_s), 2), np.nan))
+    cuts = [outage_of(path, flown.references, *window) for window in windows]  # none without GPS
     return [Entrant(DEAD_RECKONING, None, track, tuple(cuts))]
 
 

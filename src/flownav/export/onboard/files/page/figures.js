@@ -62,8 +62,14 @@ export const horizontalRms = (estimate, reference) => {
   return rows.length ? Math.sqrt(mean(squared(rows))) : null;
 };
 
-// An outage of GPS: horizontal error against its fixes, less the mean of the window's first five.
-export function outage(path, fixes, delayS, [t0, t1]) {
+// An outage of GPS: horizontal error against the truth, turned onto the path, at the instants that GPS would describe, or
+// against its fixes where there is no truth; less the mean of the window's first five.
+export function outage(path, gps, truth, delayS, [t0, t1]) {
+  const placed = truth && truthPlaced(path, truth);
+  const fixes = !placed ? gps : {
+    t: Float64Array.from(truth.t_s, (t) => t + delayS),
+    columns: ((rows) => [0, 1].map((k) => rows.map((row) => row[k])))(rowsOf(truth).map(placed.turned)),
+  };
   const inside = [...fixes.t.keys()].filter((i) => fixes.t[i] >= t0 && fixes.t[i] < t1);
   const reference = { t: inside.map((i) => fixes.t[i] - delayS), columns: fixes.columns.slice(0, 2).map((c) => inside.map((i) => c[i])) };
   const rows = differenceAt(path, reference);
@@ -96,12 +102,19 @@ function velocityOf(t, rows) {
   });
 }
 
-export function truthScores(path, velocity, truth) {
-  const rows = Array.from(truth.t_s, (_, i) => [truth.pos_n_m[i], truth.pos_e_m[i], truth.pos_d_m[i]]);
-  const known = { t: truth.t_s, columns: [truth.pos_n_m, truth.pos_e_m, truth.pos_d_m] }, n = path.t.length;
-  const covered = rows.filter((_, i) => truth.t_s[i] >= path.t[0] && truth.t_s[i] <= path.t[n - 1]);
+const rowsOf = (truth) => Array.from(truth.t_s, (_, i) => [truth.pos_n_m[i], truth.pos_e_m[i], truth.pos_d_m[i]]);
+
+// How a truth lies in the path's frame; null without two rows of it that the path covers.
+function truthPlaced(path, truth) {
+  const n = path.t.length, covered = rowsOf(truth).filter((_, i) => truth.t_s[i] >= path.t[0] && truth.t_s[i] <= path.t[n - 1]);
   if (covered.length < 2) return null;
-  const apart = differenceAt(path, known), placed = align(covered.map((row, i) => row.map((v, k) => v + apart[i][k])), covered);
+  const apart = differenceAt(path, { t: truth.t_s, columns: [truth.pos_n_m, truth.pos_e_m, truth.pos_d_m] });
+  return align(covered.map((row, i) => row.map((v, k) => v + apart[i][k])), covered);
+}
+
+export function truthScores(path, velocity, truth) {
+  const rows = rowsOf(truth), placed = truthPlaced(path, truth);
+  if (!placed) return null;
   const moved = rows.map(placed.moved);
   const error = differenceAt(path, { t: truth.t_s, columns: [0, 1, 2].map((k) => moved.map((row) => row[k])) });
   const squares = squared(error), moving = velocityOf(truth.t_s, rows).map(placed.turned);

@@ -76,7 +76,7 @@ export function scores(flown, fed, truth, delayS, cut) {
   return {
     numbers: {
       digest: flown.digest, estimates: path.t.length,
-      outages: cut && fixes.t.length ? [figures.outage(path, fixes, delayS, cut)] : [],
+      outages: cut && fixes.t.length ? [figures.outage(path, fixes, truth, delayS, cut)] : [],
       velocity_rms_m_s: told.t.length ? figures.horizontalRms(velocity, told) : null,
       ...(against ? { truth: said } : {}),
       protection: figures.protection(flown.estimates),

@@ -60,6 +60,9 @@ def test_a_sensor_of_a_rig(tmp_path):
     assert sensor.gain.value == pytest.approx(0.9, abs=0.03)
     assert sensor.latency_s.value == pytest.approx(0.08, abs=0.01)
     assert sensor.facts["gain"]["value"] == pytest.approx(sensor.gain.value, rel=1e-6)
+    assert f"latency {1e3 * sensor.latency_s.value:.0f} ms [" in repr(sensor)
+    unseen = sensor.changed(identification={"identifiable": 1})  # as of a log whose motion shows the gain alone
+    assert repr(unseen).endswith("latency not shown by its log>")
     kept = flownav.Sensor.load(sensor.save(tmp_path / "sensor.toml"))
     assert (kept.gain, kept.latency_s, kept.file) == (sensor.gain, sensor.latency_s, sensor.file)
     assert set(sensor.save_parameters(tmp_path / "sensor.param", "ardupilot")) >= {"EK3_FLOW_DELAY"}

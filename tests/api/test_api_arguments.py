@@ -232,3 +232,42 @@ def test_times_that_no_flight_has_are_in_no_file(t_s, told, tmp_path):
     without = flownav.Record({"kind": "replay"}, {"estimate": zeros})
     assert "no t_s" in said(without.save, tmp_path / "x.fnr")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("manifest", "told"),
+    [
+        ({"scores": 3}, "scores: Input should be a valid dictionary"),
+        ({"kind": ["fly"]}, "kind: Input should be a valid string"),
+        ({"parameters": "x"}, "parameters: Input should be a valid dictionary"),
+        ({"duration_s": float("nan")}, "duration_s: Input should be a finite number"),
+        ({"scores": {("a", "b"): 1}}, "keys must be str"),
+    ],
+)
+def test_a_manifest_that_no_record_has_is_refused_in_one_line(manifest, told):
+    text = said(flownav.Record, manifest)
+    assert told in text
+    assert text.startswith("no record has this manifest: ")
+    assert "\n" not in text
+
+
+@pytest.mark.parametrize(
+    ("manifest", "looks"),
+    [
+        ({"scores": {"touchdown": 3}}, "repr verdict html"),
+        ({"scores": {"touchdown": {"rest": {"distance_m": "far"}}}}, "repr html"),
+        ({"scores": {"outages": [3]}}, "repr html"),
+        ({"scores": {"truth": [1]}}, "repr html"),
+        ({"covered_fraction": "most"}, "repr html"),
+        ({"findings": 3}, "verdict html"),
+        ({"findings": [{"bad": True}]}, "verdict html"),
+        ({"scores": {"touchdown": {"reason": "wind"}}}, "verdict html repr"),
+    ],
+)
+def test_what_makes_no_sense_inside_a_manifest_is_one_line_wherever_it_is_looked_at(manifest, looks):
+    record = flownav.Record(manifest)
+    calls = {"repr": record.__repr__, "verdict": lambda: record.verdict, "html": record._repr_html_}
+    for look in looks.split():
+        text = said(calls[look])
+        assert text.startswith("manifest: flownav writes other scores or facts (")
+        assert "\n" not in text

@@ -12,6 +12,7 @@ from blackbox_logs import blackbox_log
 from blackbox_logs import quantised as box_tables
 from crazyflie_logs import deck_log
 from crazyflie_logs import quantised as deck_tables
+from dataflash_files import dataflash_of
 from flownav.core.errors import InputError
 from flownav.logs.assembly import MOST_BYTES, content_of
 from flownav.logs.csv_table import MOST_COLUMNS, MOST_HEADER_BYTES
@@ -22,6 +23,7 @@ from fuzzing import FLOOR_BYTES, peak_bytes
 from mavlink_logs import flight_log
 from replay_logs import log_of_flight
 from ros_bags import BagMaker, StoragePlugin, ros_flight
+from ulog_files import ulog_of_flight
 
 
 @pytest.fixture
@@ -52,6 +54,8 @@ def test_a_log_of_four_gigabytes_of_nothing_is_refused(folder, tmp_path):
         "x.tlog": flight_log(4.0).content,
         "x.bbl": blackbox_log(box_tables(flown.tables, inav=True), inav=True).content(),
         "x.log": deck_log(deck_tables(flown.tables)).content(),
+        "x.bin": dataflash_of(flown).content(),
+        "x.ulg": ulog_of_flight(flown.tables).bytes(),
     }
     for name, content in logs.items():
         (tmp_path / name).write_bytes(content)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, cast
 
@@ -31,6 +33,7 @@ class Record(ground.Record):
     @checked
     def __init__(self, manifest: dict[str, Any] | None = None, tables: dict[str, Any] | None = None) -> None:
         super().__init__({} if manifest is None else manifest, {} if tables is None else tables)
+        _require_kinds(self.manifest)
         for name, table in self.tables.items():
             require_kind(f"table {name}", table, dict[str, Any])
 
@@ -156,15 +159,15 @@ class Record(ground.Record):
             >>> flownav.fly("landing", flight={"duration_s": 6.0}).verdict
             ''
         """
-        bad = [found["text"] for found in self.manifest.get("findings") or () if found.get("bad")]
-        if bad:
-            return str(bad[0])
-        landing = self.scores.get("touchdown") or {}
-        if landing.get("reason"):
-            return f"{landing['verdict']}: {landing['reason']}"
-        return (
-            f"crashed: {', '.join(landing['broken'])}" if self.scores.get("crashed") and landing.get("broken") else ""
-        )
+        with _understood():
+            bad = [found["text"] for found in self.manifest.get("findings") or () if found.get("bad")]
+            landing = self.scores.get("touchdown") or {}
+            if bad:
+                return str(bad[0])
+            if landing.get("reason"):
+                return f"{landing['verdict']}: {landing['reason']}"
+            crashed = self.scores.get("crashed") and landing.get("broken")
+            return f"crashed: {', '.join(landing['broken'])}" if crashed else ""
 
     # -- what people look at -------------------------------------------------------------------------------------
     @checked
@@ -253,12 +256,34 @@ class Record(ground.Record):
     def __repr__(self) -> str:
         from flownav.api.plots import lines_of
 
-        return "\n".join(lines_of(self))
+        with _understood():
+            return "\n".join(lines_of(self))
 
     def _repr_html_(self) -> str:
         from flownav.api.plots import html_of
 
-        return html_of(self)
+        with _understood():
+            return html_of(self)
+
+
+def _require_kinds(manifest: Mapping[str, Any]) -> None:
+    """InputError where a key of a manifest is of a kind that the reader of its file would refuse."""
+    from flownav.core.record_file import check_manifest
+
+    try:
+        check_manifest(json.loads(json.dumps(manifest, default=str)))
+    except (TypeError, ValueError, RecursionError) as error:
+        raise InputError(f"no record has this manifest: {error}") from error
+
+
+@contextmanager
+def _understood() -> Iterator[None]:
+    """InputError where what lies inside a manifest's keys is of another kind than flownav writes there."""
+    try:
+        yield
+    except (AttributeError, TypeError, KeyError, ValueError, IndexError) as error:
+        what = " ".join(str(error).split())[:200]
+        raise InputError(f"manifest: flownav writes other scores or facts ({what}); make the record anew") from error
 
 
 def load(path: str | Path) -> Record:

@@ -169,12 +169,17 @@ def _manifest(text: bytes, path: Path, newest: int) -> dict[str, Any]:
         raise ValueError(f"{MANIFEST} is no object")
     if isinstance(content.get("schema"), int) and content["schema"] > newest:
         raise InputError(f"{path}: record schema {content['schema']} is newer than this flownav; update flownav")
+    check_manifest(content)
+    return content
+
+
+def check_manifest(content: Mapping[str, Any]) -> None:
+    """ValueError where a key of a manifest, as JSON has it, is of another kind than records have."""
     try:
         Manifest.model_validate({"schema": 0, **content})
     except ValidationError as error:
         first = error.errors()[0]
         raise ValueError(f"{MANIFEST}: {'.'.join(map(str, first['loc'][:2]))}: {first['msg']}") from error
-    return content
 
 
 def _check_tables(bundle: zipfile.ZipFile, names: list[str], size: int, known: Mapping[str, tuple[str, ...]]) -> None:

@@ -297,12 +297,18 @@ def pressure_altitude_m(pressure_pa: Array) -> Array:
     return np.where(possible, SCALE_HEIGHT_M * (1.0 - ratio**ALTITUDE_EXPONENT), np.nan)
 
 
+def checked_size(path: Path, most_bytes: int = MOST_BYTES) -> int:
+    """A file's bytes. InputError where they are more than a log ever has; OSError where there is no file."""
+    size = an_input(path).stat().st_size
+    if size > most_bytes:
+        raise InputError(f"{path}: larger than {most_bytes >> 20} MB; cut the log into pieces")
+    return size
+
+
 def content_of(path: Path, what: str, most_bytes: int = MOST_BYTES) -> bytes:
     """A file's bytes. InputError where it cannot be read, or is larger than such a log ever is or than the memory."""
     try:
-        size = an_input(path).stat().st_size
-        if size > most_bytes:
-            raise InputError(f"{path}: larger than {most_bytes >> 20} MB; cut the log into pieces")
+        size = checked_size(path, most_bytes)
         with path.open("rb") as file:
             return file.read(size)
     except MemoryError as error:

@@ -14,7 +14,7 @@ import numpy as np
 from flownav.core.errors import InputError
 from flownav.core.guard import an_input
 from flownav.core.measurement import Array
-from flownav.logs.assembly import Rows, put_in_order
+from flownav.logs.assembly import Rows, checked_size, put_in_order
 from flownav.logs.ulog_framing import Framed, frame
 from flownav.logs.ulog_rows import Bytes, Places, field_of
 
@@ -128,6 +128,7 @@ def read_topics(path: Path, wanted: Collection[str], fields: Collection[str], st
 def _content(path: Path) -> tuple[mmap, str]:
     """The file's bytes, mapped as long as something holds them, and their hash."""
     try:
+        checked_size(path)
         with an_input(path).open("rb") as file:
             content = mmap(file.fileno(), 0, access=ACCESS_READ)
             return content, hashlib.sha256(content).hexdigest()

@@ -13,8 +13,8 @@ from flownav.core.measurement import Array
 from flownav.lab.identification.flight import LEAST_FLOW, Flight
 from flownav.lab.identification.reference_motion import Motion, on_grid
 from flownav.logs.log import mean_over
+from flownav.logs.references import lasting, leaps_of, listed
 
-LEAP_M, FASTEST_M_S, TIMES_THE_USUAL = 1.0, 20.0, 6.0
 STANDS_S, MOVING_M_S, BESIDE_S = 1.5, 0.3, 1.0
 BLOCK_S, LEAST_PIECE_S, LEAST_BLOCKS = 1.0, 12.0, 24
 DRIFT_M_S, TURN_RAD = 0.25, 0.2  # from which on a piece differs from the other
@@ -40,15 +40,11 @@ def without_leaps_and_stands(flown: Flight) -> Mended:
             good &= ~((flown.t_s > begin - BESIDE_S) & (flown.t_s < end + BESIDE_S))
             notes.append(f"{flown.reference_name} stands still from {begin:.1f} to {end:.1f} s while the flow moves")
             ends.append(end)
-    step = np.diff(place, axis=0)
-    long = np.linalg.norm(step, axis=1)  # of a noisy reference every step is
-    far = long > LEAP_M + FASTEST_M_S * np.minimum(np.diff(t_s), 1.0) + TIMES_THE_USUAL * float(np.median(long))
-    for row in np.flatnonzero(far):
-        place = np.concatenate([place[: row + 1], place[row + 1 :] - step[row]])
-        if not any(abs(t_s[row + 1] - end) < BESIDE_S for end in ends):
-            size = float(np.linalg.norm(step[row]))
-            notes.append(f"{flown.reference_name} leaps by {size:.1f} m at {t_s[row + 1]:.1f} s")
-            good &= np.abs(flown.t_s - t_s[row]) > 0.5 * BESIDE_S
+    for leap in lasting(leaps_of(t_s, place), t_s, place):
+        place = np.where((t_s >= leap.t_s)[:, None], place - leap.by_ned_m, place)
+        if not any(abs(leap.t_s - end) < BESIDE_S for end in ends):
+            notes.append(f"{flown.reference_name} leaps {listed([leap])}")
+            good &= np.abs(flown.t_s - leap.t_s) > 0.5 * BESIDE_S
     if not notes or np.count_nonzero(good) < LEAST_FLOW:
         return Mended(flown, ())
     return Mended(replace(flown, good=good, reference_m=place), tuple(notes))

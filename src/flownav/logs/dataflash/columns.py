@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from flownav.core.errors import InputError
 from flownav.core.guard import an_input
 from flownav.core.measurement import Array
+from flownav.logs.assembly import checked_size
 from flownav.logs.csv_table import Column, CsvTable, check_clock, check_finite
 from flownav.logs.dataflash import formats
 from flownav.logs.dataflash.text_form import LOOKED_AT_BYTES, binary_of, is_text
@@ -180,6 +181,7 @@ def _converted(values: NDArray[Any], code: str) -> NDArray[Any]:
 
 def _content(path: Path) -> formats.Bytes:
     try:
+        checked_size(path)
         with an_input(path).open("rb") as file:
             content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
         as_text = is_text(content[:LOOKED_AT_BYTES])

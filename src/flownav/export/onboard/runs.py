@@ -62,16 +62,16 @@ def runs_of(folder: Path, manifest: dict[str, Any]) -> Iterator[Ran]:
     built = Built(folder, manifest["target"], Rates(**manifest["rates"]).sizes, vectors_of(folder))
     for where, run in places(built.target):
         try:
-            said = run(built)
+            reported = run(built)
         except NotHereError as reason:
             yield Ran(where, 0, 0, why=str(reason))
         else:
-            yield compared(where, said, manifest["digests"])
+            yield compared(where, reported, manifest["digests"])
 
 
-def compared(where: str, said: Sequence[str], expected: Sequence[str]) -> Ran:
+def compared(where: str, reported: Sequence[str], expected: Sequence[str]) -> Ran:
     """Digests of a place beside the expected ones; what a place did not report differs."""
-    right = [i < len(said) and said[i] == digest for i, digest in enumerate(expected)]
+    right = [i < len(reported) and reported[i] == digest for i, digest in enumerate(expected)]
     differs = None if all(right) else (right.index(False) + 1) * VECTORS_A_DIGEST
     return Ran(where, len(expected), sum(right), differs)
 

@@ -12,11 +12,11 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from emulation.boards import EmulatedBoard
 from flownav.api.building import flight_of
 from flownav.core.errors import FlownavError, InputError
 from flownav.core.measurement import Sensor
 from flownav.export.onboard.interface import Rates
+from flownav.export.onboard.library_boards import EmulatedBoard
 from flownav.export.onboard.package import manifest_of, pace_of, packed_settings, readings_of
 from flownav.export.onboard.targets import LIBRARY
 from flownav.navigation.rings import Given

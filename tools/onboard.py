@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from emulation.boards import library_board
 from emulation.means import means_apart
 from emulation.narrow import KEPT, worst
 from flownav.api.building import SHIPPED_FLIGHT, flight_of
@@ -31,6 +30,7 @@ from flownav.export.onboard import package
 from flownav.export.onboard.board import NOTHING, Board
 from flownav.export.onboard.code import WITHOUT
 from flownav.export.onboard.interface import OUTCOME_NUMBERS, Rates
+from flownav.export.onboard.library_boards import library_board
 from flownav.export.onboard.package import Asked, Flight, code_of, pace_of, packed_settings, rates_of, readings_of
 from flownav.export.onboard.targets import TARGETS
 from flownav.navigation import progress, waiting

@@ -12,6 +12,8 @@ HEAVY = ("numpy", "numba", "scipy", "pandas", "polars", "xarray", "plotly", "pya
 NEVER = ("numba", "pandas", "plotly", "scipy.special", "scipy.linalg", "scipy.signal", "scipy.spatial", "scipy.stats",
          "scipy.ndimage", "scipy.optimize", "scipy.interpolate", "numpy.f2py", "PIL", "ray", "matplotlib")  # fmt: skip
 
+SIMULATOR = ("flownav.simulation", "flownav.campaigns", "flownav.control", "flownav.parts")
+
 
 def loaded_by(code: str, of: tuple[str, ...] = HEAVY) -> set[str]:
     """The modules among these that a fresh interpreter has after this code, all of whose kernels are compiled: the
@@ -96,6 +98,17 @@ def test_a_log_of_csv_files_is_looked_at_with_no_more(tmp_path):
     made = str(tmp_path / "made")
     loaded_by_command("sample", "csv", "--out", made)
     assert loaded_by_command("info", f"{made}/flight-csv", of=NEVER) == set()
+
+
+def test_a_log_and_a_record_are_replayed_without_the_simulator(tmp_path):
+    """Half a second of processor time went into a simulator that no replay by our own navigator flies in."""
+    made, record = str(tmp_path / "made"), str(tmp_path / "log.fnr")
+    assert "flownav.simulation" in loaded_by_command("sample", "csv", "--out", made, of=SIMULATOR)
+    assert loaded_by_command("replay", f"{made}/flight-csv", "--out", record, of=SIMULATOR) == set()
+    assert loaded_by_command("replay", record, "--no-report", "--out", str(tmp_path / "a.fnr"), of=SIMULATOR) == set()
+    assert loaded_by_command("info", f"{made}/flight-csv", of=SIMULATOR) == set()
+    assert loaded_by_command("report", record, "--out", str(tmp_path / "page.html"), of=SIMULATOR) == set()
+    assert loaded_by("from flownav import Record, Sensor, replay", of=SIMULATOR) == set()
 
 
 @pytest.mark.parametrize(

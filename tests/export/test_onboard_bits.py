@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from emulation.boards import LibraryBoard, library_board
 from flownav.api.building import flight_of as flight_named
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
 from flownav.export.onboard.board import Board
+from flownav.export.onboard.library_boards import LibraryBoard, library_board
 from flownav.export.onboard.package import Flight, pace_of, packed_settings, rates_of, readings_of
 from flownav.export.onboard.targets import TARGETS
 from flownav.navigation import progress, waiting

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from emulation.boards import LibraryBoard, library_board
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
 from flownav.export.onboard.board import NOTHING, Board
 from flownav.export.onboard.code import WITHOUT
 from flownav.export.onboard.interface import Rates
+from flownav.export.onboard.library_boards import LibraryBoard, library_board
 from flownav.export.onboard.package import Asked, code_of
 from flownav.export.onboard.targets import TARGETS
 from flownav.navigation import progress, waiting

@@ -62,7 +62,7 @@ def built(record, tmp_path_factory) -> Path:
     done = run("build", "--target", "linux-x86_64", "--record", record, "--out", folder)
     assert done.returncode == 0, done.stderr
     assert re.search(r"Code \d+\.\d kB, constants \d", done.stdout)
-    assert f"`flownav verify {folder}` looks at it again" in " ".join(done.stdout.split())
+    assert f"`flownav verify {folder}` looks at it again, and runs it" in " ".join(done.stdout.split())
     return folder
 
 

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from emulation.boards import LibraryBoard, library_board
 from flownav.core.measurement import Array
 from flownav.export.onboard.board import Board
+from flownav.export.onboard.library_boards import LibraryBoard, library_board
 from flownav.live import filtering
 from flownav.navigation import progress
 from flownav.navigation.now import NowRow

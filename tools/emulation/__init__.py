@@ -1,1 +1,1 @@
-"""The library on processors that are not this one: emulated by unicorn and wasmtime, for tests and for measuring."""
+"""Studies of the library: means of inertial readings, and numbers of 32 bits."""

@@ -119,9 +119,11 @@ def flight_of(
 def verify(what: str | Path, record: str | Path | None = None, *, horizon_s: float | None = None) -> dict[str, Any]:
     """Compare the output of a board or a browser with the same flight computed here.
 
-    what: a digest, a file of lines (readings, digest), or a folder of `build`, whose files are looked at, too. record:
-    the record or log of the flight; the shipped one where none is given. horizon_s: that of the board, of a digest.
-    InputError where these do not belong together. `equal` says whether all is the same.
+    what: a digest, a file of lines (readings, digest), or a folder of `build`, whose files are looked at and whose own
+    code runs its test vectors wherever this machine can: `ran` names each place, its digests, and why nothing ran in
+    it. record: the record or log of the flight; where none is given, the shipped one, or a folder's own vectors.
+    horizon_s: that of the board, of a digest. InputError where these do not belong together. `equal` says whether all
+    is the same.
 
     Example:
         >>> import flownav
@@ -131,31 +133,38 @@ def verify(what: str | Path, record: str | Path | None = None, *, horizon_s: flo
         >>> flownav.verify("0123456789abcdef", log)["equal"]
         False
     """
-    from flownav.export.onboard.interface import Rates
-    from flownav.export.onboard.package import manifest_of, readings_of
-    from flownav.export.onboard.verify import LoggedDigest, board_for, changed_files, compare, logged_digests, verified
+    from flownav.export.onboard.verify import logged_digests, verified
 
-    folder = Path(what)
-    if not folder.is_dir():
-        logged, flight = logged_digests(str(what)), flight_of(record)
-        found = verified(logged, flight, _rates(flight, 0.27 if horizon_s is None else horizon_s))
-        return _facts_of(str(what), found, [])
+    if Path(what).is_dir():
+        return _folder_verified(Path(what), record)
+    logged, flight = logged_digests(str(what)), flight_of(record)
+    found = verified(logged, flight, _rates(flight, 0.27 if horizon_s is None else horizon_s))
+    return _facts_of(str(what), found, [], [])
+
+
+def _folder_verified(folder: Path, record: str | Path | None) -> dict[str, Any]:
+    """A folder of `build`: its files, its vectors (or a record's readings) in Python, and its own code where it runs.
+
+    Code that was changed since is not run.
+    """
+    from flownav.export.onboard.constants import VECTORS_A_DIGEST
+    from flownav.export.onboard.package import manifest_of
+    from flownav.export.onboard.runs import runs_of
+    from flownav.export.onboard.verify import LoggedDigest, changed_files, compare, passed_to
+
     manifest = manifest_of(folder)
+    digests = [int(digest, 16) for digest in manifest["digests"]]
+    logged = [LoggedDigest(i * VECTORS_A_DIGEST, digest) for i, digest in enumerate(digests, 1)]
     changed = list(changed_files(folder, manifest))
-    rates, flight = Rates(**manifest["rates"]), flight_of(record)
-    every = 50
-    logged = [LoggedDigest((i + 1) * every, int(digest, 16)) for i, digest in enumerate(manifest["digests"])]
-    found = compare(
-        logged, readings_of(flight)[: len(logged) * every], board_for(flight, rates, tuple(manifest["without"]))
-    )
-    return _facts_of(str(what), found, changed)
+    readings, board = passed_to(folder, manifest, None if record is None else flight_of(record))
+    found = compare(logged, readings[: len(logged) * VECTORS_A_DIGEST], board)
+    ran = [] if changed else [each._asdict() for each in runs_of(folder, manifest)]
+    return _facts_of(str(folder), found, changed, ran)
 
 
-def _facts_of(what: str, found: "Found", changed: list[str]) -> dict[str, Any]:
+def _facts_of(what: str, found: "Found", changed: list[str], ran: list[dict[str, Any]]) -> dict[str, Any]:
     """Facts of a comparison, as a dictionary."""
     facts = found._asdict()
     equal_digests = facts.pop("equal")
-    return {
-        "what": what, "changed": changed, "equal": found.differs is None and not changed,
-        "equal_digests": equal_digests, **facts,
-    }  # fmt: skip
+    equal = found.differs is None and not changed and all(each["differs"] is None for each in ran)
+    return {"what": what, "changed": changed, "equal": equal, "equal_digests": equal_digests, **facts, "ran": ran}

@@ -12,14 +12,14 @@ from numbers import Integral
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flownav.core.errors import InputError, arg
 from flownav.core.guard import write_text
 from flownav.core.text import meant, to_toml
-from flownav.parts.calling import name_of
-from flownav.parts.naming import OURS, part_of, require
-from flownav.parts.protocols import Parts
+
+if TYPE_CHECKING:  # a replay, a report or a table needs neither parts of one's own nor the simulator that flies them
+    from flownav.parts.protocols import Parts
 
 LONGEST_ARGUMENT = 200  # characters of one argument
 
@@ -56,12 +56,15 @@ def require_from(name: str, value: int, low: int, high: int) -> None:
         raise InputError(f"{name} = {value!r}: must be a whole number from {low} to {high}")
 
 
-def split(filter: Any, sensors: Sequence[Any], vehicle: Any, controller: Any) -> tuple[Parts, str | None, Any]:
+def split(filter: Any, sensors: Sequence[Any], vehicle: Any, controller: Any) -> tuple["Parts", str | None, Any]:
     """The parts that are not flownav's, and the names of filter and vehicle that are the scenario's (None where they
     are not).
 
     A filter by another name than ours is an entry point's or a file's. InputError where an object is no such part.
     """
+    from flownav.parts.naming import OURS
+    from flownav.parts.protocols import Parts
+
     own_filter, own_vehicle = None, None
     if filter is not None and not (isinstance(filter, str) and filter in OURS["filter"]):
         own_filter, filter = _part("filter", filter), None
@@ -83,6 +86,9 @@ def own_filter(filter: Any) -> Any:
 
 def _part(kind: str, part: Any) -> Any:
     """A part by its name, or the one that is given."""
+    from flownav.parts.calling import name_of
+    from flownav.parts.naming import part_of, require
+
     if isinstance(part, str):
         return part_of(kind, part)
     require(kind, part, name_of(part))

@@ -14,11 +14,9 @@ from flownav.core.parameter_files import check, load
 from flownav.core.provenance import called_as, command_words
 from flownav.logs.log import Log
 from flownav.logs.open_log import open_flight
+from flownav.navigation.filter_protocol import Filter
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import settings_of
-from flownav.parts.calling import name_of
-from flownav.parts.flying import replay_with
-from flownav.parts.protocols import Filter
 from flownav.replays.bundle import to_record
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
@@ -75,7 +73,7 @@ def replay(
         "sensor": sensor, "settings": settings, "smooth": smooth, "outage_table": outage_table,
         "flow_instance": flow_instance,
         "topics": None if topics is None else dict(topics),
-        "filter": filter if filter is None or isinstance(filter, str) else name_of(filter),
+        "filter": filter if filter is None or isinstance(filter, str) else _name_of(filter),
     }  # fmt: skip
     part = own_filter(filter)
     call = call_of("replay", log, **changed(replay, options))
@@ -106,6 +104,8 @@ def replay_log(
     if part is not None and (table or smooth):
         raise InputError("a filter of your own takes neither an outage table nor smoothing; leave them out")
     if part is not None:
+        from flownav.parts.flying import replay_with
+
         flown = replay_with(log, options, settled, part)
     else:
         flown = run_log(log, options, settled, smoothed=smooth)
@@ -114,8 +114,15 @@ def replay_log(
         scores |= _table_scores(flown, table, scores["outages"], progress)
     record = Record.of(to_record(flown, scores, command_words()))
     if part is not None:
-        record.manifest["filter"] = name_of(part)
+        record.manifest["filter"] = _name_of(part)
     return record
+
+
+def _name_of(part: object) -> str:
+    """The name of a filter of one's own in records and calls."""
+    from flownav.parts.calling import name_of
+
+    return name_of(part)
 
 
 def _table_scores(

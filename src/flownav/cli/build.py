@@ -13,6 +13,7 @@ from flownav.cli.output import answer, folder_place
 from flownav.core.errors import InputError, VerdictError
 
 TARGET = "The processor."
+VERIFIED = "Build nothing; verify a folder that was built, as `flownav verify DIR` does."
 RECORD = "A flight whose settings it is built for, and whose readings prove it."
 WITHOUT = "Leave parts out: less code."
 HORIZON = "How far behind the newest reading an instant is when it is fused [s]."
@@ -21,10 +22,11 @@ CPU, FEATURES = "With a triple: the CPU, as LLVM calls it.", "With a triple: its
 WHAT = "A board's answer: 16 digits, a file of lines (readings, digits), or a folder of `flownav build`."
 FLIGHTS = "those of the flight"
 FLOWN = "the scenario pad_return, flown here"
+FLIGHT = f"The flight, by default the folder's own vectors, or {FLOWN}."
 
 
 def command(
-    target: Annotated[str, chosen(TARGET, *options.TARGETS, flag="--target", unset=False, beside="TRIPLE")],
+    target: Annotated[str, chosen(TARGET, *options.TARGETS, flag="--target", unset=False, beside="TRIPLE")] = "",
     out: Annotated[Path | None, out_option("The folder", "flownav-TARGET")] = None,
     record: Annotated[Path | None, option("RECORD", RECORD, unset=FLOWN)] = None,
     sensor: options.Sensor = None,
@@ -37,12 +39,20 @@ def command(
     others_hz: Annotated[float | None, option("HZ", OTHERS, unset=FLIGHTS, within=(10.0, 2000.0))] = None,
     cpu: Annotated[str, option("CPU", CPU, unset="LLVM's own choice")] = "",
     features: Annotated[str, option("LIST", FEATURES, unset="those of the CPU")] = "",
+    built: Annotated[Path | None, option("DIR", VERIFIED, "--verify", unset=False)] = None,
     force: options.Force = False,
     as_json: options.Json = False,
 ) -> None:
     """Write the navigator as a library for a flight controller, a companion computer or the browser."""
     from flownav.api.building import build, interface
 
+    if built is not None:
+        if target or out is not None:
+            raise InputError("--verify: it builds nothing; leave --target and --out away")
+        verify(str(built), record, None, as_json)
+        return
+    if not target:
+        raise InputError(f"--target: choose from {', '.join(options.TARGETS)}, or an LLVM triple")
     if target == options.TARGETS[-1]:
         if out is not None or as_json:
             raise InputError(f"--target {target}: it prints the header and nothing else; leave --out and --json away")
@@ -64,16 +74,19 @@ def _show(place: Path, facts: dict[str, Any]) -> None:
         f"Code {facts['code_bytes'] / 1000:.1f} kB, constants {facts['constant_bytes'] / 1000:.1f} kB, settings "
         f"{facts['settings_bytes'] / 1000:.1f} kB; RAM of a navigator {facts['navigator_bytes'] / 1000:.1f} kB"
     )
-    typer.echo(f"README.md explains its use; `flownav verify {place}` looks at it again")
+    typer.echo(f"README.md explains its use; `flownav verify {place}` looks at it again, and runs it")
 
 
 def verify(
     what: Annotated[str, named("DIR|DIGEST|LINES", WHAT)],
-    record: Annotated[Path | None, named("RECORD", f"The flight, by default {FLOWN}.")] = None,
+    record: Annotated[Path | None, named("RECORD", FLIGHT)] = None,
     horizon: Annotated[float | None, option("S", HORIZON, unset="0.27, or the folder's", within=(0.0, 1.0))] = None,
     as_json: options.Json = False,
 ) -> None:
-    """Replay a flight here, and compare it with the output of a board or a browser, to the first difference."""
+    """Replay a flight here, and compare it with the output of a board or a browser, to the first difference.
+
+    The code in a folder of `flownav build` is run as well, by each emulator and browser that is installed.
+    """
     from flownav.api.building import verify as compared
 
     facts = compared(what, record, horizon_s=horizon)
@@ -86,9 +99,14 @@ def verify(
             f"{facts['t_s']:.6f} s): here {facts['expected']}, there {facts['said']}; "
             f"after {facts['same']} all was equal"
         )
+    if wrong := [f"{each['where']} after {each['differs']} readings" for each in facts["ran"] if each["differs"]]:
+        raise VerdictError(f"{what}: the folder's own code differs: {', '.join(wrong)}")
 
 
 def _say_found(facts: dict[str, Any]) -> None:
     typer.echo(
         f"{facts['equal_digests']} of {facts['compared']} digests are equal; here it ends with {facts['digest']}"
     )
+    for each in facts["ran"]:
+        found = f"not run, {each['why']}" if each["why"] else f"{each['equal']} of {each['compared']} digests are equal"
+        typer.echo(f"{each['where']}: {found}")

@@ -199,7 +199,8 @@ def manifest_of(folder: Path) -> dict[str, Any]:
     """A folder's manifest. InputError where it is none of `flownav build`."""
     try:
         found: dict[str, Any] = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-        found["files"], found["build"], found["rates"], found["digests"]
+        for name in ("files", "build", "target", "rates", "without", "lag", "digests"):
+            found[name]
         return found
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{folder}: not a folder of `flownav build` ({MANIFEST}: {error})") from error

@@ -3,13 +3,17 @@
 import base64
 import json
 import re
+from collections.abc import Sequence
 from importlib.resources import files
 from typing import Any
 
 from jinja2 import Environment, PackageLoader
 
+from flownav.navigation.rings import Given
+
 SCRIPTS = ("zstd.js", "record.js", "figures.js", "fusing.js", "page.js")  # each after what it imports
 IMPORT = re.compile(r"^import .*\n", re.M)
+EXPORT = re.compile(r"^export (?=const|class|function|async)", re.M)
 WHOLE = re.compile(r"\bfigures\.(?=[a-z])")  # a namespace that a page of one script does not have
 
 
@@ -34,4 +38,29 @@ def _one_script(around: str) -> str:
     folder = files(__package__) / "files" / "page"
     parts = [around, *((folder / name).read_text(encoding="utf-8") for name in SCRIPTS)]
     text = "\n".join(IMPORT.sub("", part) for part in parts)
-    return WHOLE.sub("", re.sub(r"^export (?=const|class|function|async)", "", text, flags=re.M))
+    return WHOLE.sub("", EXPORT.sub("", text))
+
+
+# -- the digests of test vectors ----------------------------------------------------------------------------------
+DIGESTS = """<!doctype html><meta charset="utf-8"><p id="digests"></p><script>
+{around}
+const readings = {readings};
+const bytes = Uint8Array.from(atob("{module}"), (letter) => letter.charCodeAt(0));
+Navigator.load(bytes).then((nav) => {{
+  const found = [];
+  readings.forEach(([tS, sensor, numbers], i) => {{
+    const [quality, delayS, exposureS, withheld] = numbers.slice(9), variance = numbers.slice(6, 9);
+    nav.take(tS, sensor, numbers.slice(0, 6), {{ variance, quality, delayS, exposureS, withheld }});
+    if ((i + 1) % {every} === 0) found.push(nav.digest());
+  }});
+  document.getElementById("digests").textContent = found.join(" ");
+}});
+</script>
+"""
+
+
+def digests_page(module: bytes, around: str, readings: Sequence[Given], every: int) -> str:
+    """A page that passes readings to the module and shows the digest after every `every` of them, in `#digests`."""
+    rows = json.dumps([[given.t_s, given.sensor, given.numbers.tolist()] for given in readings])
+    own = EXPORT.sub("", around)
+    return DIGESTS.format(around=own, readings=rows, module=base64.b64encode(module).decode(), every=every)

@@ -12,6 +12,7 @@ from flownav.core.measurement import Sensor
 from flownav.export.onboard.board import Board
 from flownav.export.onboard.interface import Rates
 from flownav.export.onboard.package import Flight, pace_of, packed_settings, readings_of
+from flownav.export.onboard.vectors import vectors_of
 from flownav.navigation.rings import Given
 
 DIGEST = re.compile(r"[0-9a-fA-F]{16}")
@@ -110,3 +111,12 @@ def changed_files(folder: Path, manifest: dict[str, Any]) -> Iterator[str]:
         file = folder / Path(name).name
         if not file.is_file() or hashlib.sha256(file.read_bytes()).hexdigest() != digest:
             yield name
+
+
+def passed_to(folder: Path, manifest: dict[str, Any], flight: Flight | None) -> tuple[list[Given], Board]:
+    """Readings, and the board here that takes them: those of a flight, or the folder's own vectors and settings."""
+    rates, without = Rates(**manifest["rates"]), tuple(manifest["without"])
+    if flight is not None:
+        return readings_of(flight), board_for(flight, rates, without)
+    settings, readings = vectors_of(folder)
+    return readings, Board(settings, rates.sizes, lag=manifest["lag"])

@@ -1,4 +1,7 @@
-"""The library on four processors behind one interface: natively (ctypes), emulated (unicorn), in wasmtime."""
+"""The library on four processors behind one interface: natively (ctypes), emulated (unicorn), in wasmtime.
+
+unicorn and wasmtime are imported where a board of theirs is made: ImportError where they are not installed.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from emulation.processor import UNTOUCHED, Processor
 from flownav.core.measurement import Array
 from flownav.export.onboard.board import NOTHING, Outcome
 from flownav.export.onboard.elf import read_object, shared_object
@@ -23,6 +25,7 @@ from flownav.navigation.rows import EVENT_COLUMNS, INNOVATION_COLUMNS
 from flownav.navigation.waiting_records import READING
 
 HEAD = len(onboard.OutcomeHead._fields)
+UNTOUCHED = 0xA5  # what a stack is painted with, to see how much of it is used
 FUEL = 1 << 60  # of wasmtime: about one an instruction
 INNOVATIONS, EVENTS = onboard.MOST_INNOVATIONS * INNOVATION_COLUMNS, onboard.MOST_EVENTS * EVENT_COLUMNS
 
@@ -133,6 +136,8 @@ class EmulatedBoard(LibraryBoard):
     """A Cortex-M7, an AArch64 or an x86-64 in unicorn."""
 
     def __init__(self, settings: Array, sizes: waiting_records.Sizes, content: bytes) -> None:
+        from flownav.export.onboard.emulated import Processor
+
         self.processor = Processor(read_object(content))
         super().__init__(settings, sizes)
 

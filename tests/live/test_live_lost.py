@@ -119,7 +119,7 @@ GYRO_FAULT_MRAD_S, STUCK_S = 50, 6.0
 
 
 def after_a_gyro_fault(others):
-    """The recording of a stuck accelerometer whose first gyro was off about the vertical before; other IMUs were not."""
+    """The recording of a stuck accelerometer whose first gyro was off before; other IMUs were not."""
 
     def heard(frames, truth):
         mav = coder(1, 1)

@@ -2,8 +2,9 @@
 
 Run with `python -m pytest benchmarks/test_bench_live.py -s`; FLOWNAV_LIVE_BENCH_S sets how long (20 s; 600 for the ten
 minutes that are asked for), FLOWNAV_LIVE_PRIORITY=0 leaves the session an ordinary process. Once alone on the machine,
-and once with a process on every core that never rests. Prints the distributions, what was dropped, and the growth of
-memory after the first tenth. The vehicle is a process of its own.
+and once with a process on every core that never rests (FLOWNAV_LIVE_LOAD_NICE, 0, is its niceness). Prints the
+distributions, what was dropped, the share of a core, and the growth of memory after the first tenth. The vehicle is a
+process of its own.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from flownav.live.recorder import Recorder
 from flownav.live.session import Session
 
 DURATION_S = float(os.environ.get("FLOWNAV_LIVE_BENCH_S", "20"))
+LOAD_NICE = int(os.environ.get("FLOWNAV_LIVE_LOAD_NICE", "0"))
 PRIORITY = os.environ.get("FLOWNAV_LIVE_PRIORITY", "1") != "0"
 FLOW_HZ = 250
 SHARES = (0.5, 0.9, 0.99, 0.999, 1.0)
@@ -72,6 +74,7 @@ def vehicle(port: int, seconds: float) -> None:
 
 def busy() -> None:
     """Work that never ends."""
+    os.nice(LOAD_NICE)
     while True:
         sum(range(10_000))
 
@@ -139,11 +142,13 @@ def test_latency_from_flow_to_estimate(tmp_path, loaded):
     scheduling = run_before_others() if PRIORITY else "ordinary"
     session = Session(options, recorder, time.monotonic(), time.time())
     memory_kb: list[int] = []
+    began_s, cpu_s = time.monotonic(), _cpu_s()
 
     def look(now_s: float) -> None:
         memory_kb.append(_resident_kb())
 
     run_session(session, link, latency, lambda: not other.is_alive(), [look])
+    share = (_cpu_s() - cpu_s) / (time.monotonic() - began_s)
     os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     for process in others:
         process.kill()
@@ -156,6 +161,7 @@ def test_latency_from_flow_to_estimate(tmp_path, loaded):
         print(f"from its {name}: {_shown([found.quantile_s(share) for share in SHARES])}")
     ours.send(None)
     print(f"the machine: a process that sleeps 1 ms wakes late by {_shown(ours.recv())}")
+    print(f"processor: {100 * share:.1f} % of a core, {1e3 * share / FLOW_HZ:.2f} ms for each flow reading")
     print(f"memory: {grown} kB more than after a tenth of the time; at most {_peak_mb():.0f} MB")
     assert recorder.finish({}).reason == ""
     assert session.sent > 0  # how many a machine that is busy sends is printed
@@ -165,6 +171,11 @@ def _shown(quantiles_s: list[float]) -> str:
     return ", ".join(
         f"p{100 * share:g} {1e3 * value_s:.3f} ms" for share, value_s in zip(SHARES, quantiles_s, strict=True)
     )
+
+
+def _cpu_s() -> float:
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    return used.ru_utime + used.ru_stime
 
 
 def _resident_kb() -> int:

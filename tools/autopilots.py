@@ -4,7 +4,7 @@ or of each fault.
 Flies what the folder does not hold, in real time, some three minutes each; the simulators are found as `flownav sitl`
 finds them. `--as-flown` prints what is there.
 
-python tools/autopilots.py PAGE FOLDER [--flights N] [--beside N] [--faults] [--as-flown]
+python tools/autopilots.py PAGE FOLDER [--flights N] [--beside N] [--vehicles V ...] [--faults] [--as-flown]
 """
 
 from __future__ import annotations
@@ -26,16 +26,17 @@ CASES = [
     *((vehicle, ("--scenario", "square", "--gps", gps)) for gps in ("on", "cut", "never") for vehicle in VEHICLES),
     *(
         (vehicle, ("--scenario", "square", "--gps", gps, "--wind", f"{WIND_M_S}"))
-        for gps in ("cut", "never") for vehicle in ("heli", "copter")
+        for gps in ("on", "cut", "never") for vehicle in ("heli", "copter")
     ),
     *((vehicle, ("--scenario", "pad", "--gps", "cut")) for vehicle in ("heli", "copter")),
 ]  # fmt: skip
 FAULTY = ("--scenario", "hover", "--gps", "cut", "--fault", "all@10")
 
 
-def fly(folder: Path, flights: int, beside: int, *, faults: bool) -> None:
+def fly(folder: Path, flights: int, beside: int, vehicles: list[str], *, faults: bool) -> None:
     """Fly what is asked for and not there yet."""
     cases = [(vehicle, FAULTY) for vehicle in VEHICLES] if faults else CASES
+    cases = [case for case in cases if case[0] in vehicles]
     for number in range(
         beside, flights + 1, beside
     ):  # the same number of each, then as many again, whenever it is stopped
@@ -79,7 +80,7 @@ def with_section(page: str, title: str, text: str) -> str:
 def main(asked: argparse.Namespace) -> None:
     """Fly, print, write."""
     if not asked.as_flown:
-        fly(asked.folder, asked.flights, asked.beside, faults=asked.faults)
+        fly(asked.folder, asked.flights, asked.beside, asked.vehicles, faults=asked.faults)
     options = " --faults" if asked.faults else ""
     text = section(
         TITLES[asked.faults],
@@ -98,6 +99,7 @@ if __name__ == "__main__":
     parser.add_argument("folder", type=Path)
     parser.add_argument("--flights", type=int, default=10)
     parser.add_argument("--beside", type=int, default=1)
+    parser.add_argument("--vehicles", nargs="+", choices=VEHICLES, default=list(VEHICLES))
     parser.add_argument("--faults", action="store_true", help="each fault in a hover with GPS cut")
     parser.add_argument("--as-flown", action="store_true", help="fly nothing")
     main(parser.parse_args())

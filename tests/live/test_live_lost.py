@@ -7,7 +7,7 @@ import pytest
 
 from flownav.core.measurement import Sensor
 from flownav.logs.mavlink.framing import coder
-from played_recordings import Played
+from played_recordings import RAW_IMU, Played, with_others
 from recorded_link import Arrival
 from scaled_imu import scaled_imu_beside
 
@@ -111,6 +111,43 @@ def test_another_accelerometer_flies_on_while_one_is_stuck(played, others):
     assert "imu" in [source for _, source, _, _ in found.notes.all]
     assert np.abs(found.error_m[found.between(60.0, 85.0)]).max() < 0.5
     assert found.longest_gap_s(60.0) < 0.3
+    assert found.session.reason == ""
+
+
+GYRO_FAULT_S = 55.0, 64.0  # the stuck accelerometer follows at 68.6 s
+GYRO_FAULT_MRAD_S, STUCK_S = 50, 6.0
+
+
+def after_a_gyro_fault(others):
+    """The recording of a stuck accelerometer whose first gyro was off before; other IMUs were not."""
+
+    def heard(frames, truth):
+        mav = coder(1, 1)
+        for arrival in with_others(frames, truth, others):
+            yield arrival if arrival.message_id != RAW_IMU else turned(arrival, mav)
+
+    def turned(arrival, mav):
+        raw = mav.decode(bytearray(arrival.frame))
+        if not GYRO_FAULT_S[0] <= raw.time_usec * 1e-6 < GYRO_FAULT_S[1]:
+            return arrival
+        told = {name: getattr(raw, name) for name in raw.ordered_fieldnames}
+        told["zgyro"] += GYRO_FAULT_MRAD_S
+        mav.srcSystem, mav.srcComponent, mav.seq = arrival.frame[5], arrival.frame[6], arrival.frame[4]
+        return Arrival(arrival.now_s, bytes(mav.raw_imu_encode(**told).pack(mav)))
+
+    return heard
+
+
+@pytest.mark.parametrize(
+    ("others", "longest_gap_s"), [((), STUCK_S + 2.0), (("SCALED_IMU2",), 0.3)], ids=["alone", "with another"]
+)
+def test_a_gyro_fault_before_it_does_not_make_a_stuck_accelerometer_believed(data_folder, others, longest_gap_s):
+    """It was sent 26.7 m down within 2 s, and then nothing to the end."""
+    found = Played(data_folder / "ardupilot-live" / "accel-stuck", 88.0, beside=after_a_gyro_fault(others))
+    assert "imu" in [source for _, source, _, _ in found.notes.all]
+    assert np.abs(found.error_m[found.between(GYRO_FAULT_S[0], 88.0)]).max() < 0.5
+    assert found.longest_gap_s(50.0) < longest_gap_s
+    assert found.t_s[-1] > 88.0
     assert found.session.reason == ""
 
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+import re
 from io import StringIO
+from pathlib import Path
 
 import pytest
 from rich.console import Console
 
 from flownav.core.measurement import Sensor
 from flownav.estimation.gating import Reason
+from flownav.live.answers import WITHHELD
 from flownav.live.display import draw
 from flownav.live.loop import Latency
 from flownav.live.options import Options
@@ -71,3 +74,24 @@ def test_the_pad_is_told_in_the_frame_that_the_autopilot_takes(vehicle, frame):
         assert (last.x, last.y, last.z) == pytest.approx(expected, abs=0.2)  # it hovers level, looking north
     finally:
         wire.close()
+
+
+PAGES = Path(__file__).resolve().parents[2] / "docs"
+
+
+def test_the_page_has_each_reason_to_withhold_and_what_to_do():
+    table = (PAGES / "how-to" / "live.md").read_text(encoding="utf-8").partition("## When nothing is sent")[2]
+    rows = [line.strip("|").split("|") for line in table.splitlines() if line.startswith("| `")]
+    cures = {reason: cure.strip() for names, _, cure in rows for reason in re.findall(r"`(\w+)`", names)}
+    assert set(cures) == set(WITHHELD)
+    assert all(cures.values())
+
+
+def test_no_row_of_a_table_is_broken():
+    broken = [
+        f"{page.relative_to(PAGES)}: {line[:60]}"
+        for page in PAGES.rglob("*.md")
+        for line in page.read_text(encoding="utf-8").splitlines()
+        if line.startswith("| ") and not line.rstrip().endswith("|")
+    ]
+    assert broken == []

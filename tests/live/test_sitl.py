@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from math import cos, pi, sin
 from pathlib import Path
@@ -253,6 +254,16 @@ def test_silence_is_no_wrong_estimate():
     found = a_flight(lambda t_s: None if 15.0 < t_s < 25.0 else 0.0)
     assert found["silent_s"] == pytest.approx(10.0, abs=0.2)
     assert found["unsaid_s"] == 0.0
+
+
+def test_the_floor_is_what_the_noise_of_the_flow_integrates_to():
+    """Readings of the stated noise, added up: the rms of many hovers of 30 s at 5 m is what the figure says."""
+    found = a_flight(lambda t_s: 0.0)
+    assert found["height_m"] == pytest.approx(5.0, abs=1e-3)
+    chance = np.random.default_rng(4)
+    speeds = 5.0 * chance.uniform(-0.05, 0.05, (2000, 300, 2))
+    drifts = np.cumsum(0.1 * speeds, axis=1)
+    assert found["floor_m"] == pytest.approx(math.sqrt((drifts**2).sum(axis=2).mean()), rel=0.05)
 
 
 def test_landed_is_on_the_ground_and_upright():

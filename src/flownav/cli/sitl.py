@@ -25,9 +25,10 @@ LINK = "Keep the companion's line (from_vehicle.tlog, from_flownav.tlog), truth.
 LIVE = "Options for `flownav live`, in one string."
 BINARY = "The simulator's program."
 OUT = "Folder of records and figures; what is there already is not flown again."
-WIDE = 150
+WIDE = 170
 NOTE = (
-    "hover: the vehicle from where its hover began, rms. drift: the estimate in that time. error: largest that was "
+    "height: of the hover. floor: drift that its flow's noise alone integrates to. hover: the vehicle from where its "
+    "hover began, rms. drift: the estimate in that time. error: largest that was "
     "sent, level and down, since the last counted reset. unwarned: how long it was beyond 1 m. silent: longest gap in "
     "sending. strayed: from the commanded path. touchdown: from the place of take-off, R95. Median (worst)."
 )
@@ -43,9 +44,21 @@ def _cell(title: str, key: str, form: str = ".2f") -> Column:
     return Column(title, text)
 
 
+def _median(title: str, key: str, form: str) -> Column:
+    """The median alone, of a figure that the flight is given."""
+
+    def text(row: dict[str, Any]) -> str:
+        found = row.get(key)
+        return figure(found["median"], form) if found else "-"
+
+    return Column(title, text)
+
+
 COLUMNS = (
     Column("flown", "cell"),
     Column("landed", lambda row: f"{row['landed']} of {row['flights']}"),
+    _median("height [m]", "height_m", ".1f"),
+    _median("floor [m]", "floor_m", ".2f"),
     _cell("hover [m]", "hover_rms_m"),
     _cell("drift [m]", "error_rms_m"),
     _cell("error [m]", "error_m"),

@@ -9,6 +9,9 @@ is neither calibrated nor, of some sensors, turned into the vehicle's axes. The 
 with PX4's calibration, a matrix S and an offset, which stand still, and EKF2's bias, which creeps. What the difference
 changes with the vehicle's attitude is S, and stays; what creeps since the start is EKF2's, and is put back. Recursive
 least squares separate the two: S is within SCALED_BY, and the bias moves by CREEPS in a second.
+
+The noise of the own field is in the difference as well, with the other sign. A single reading would so be taken for a
+sensor that PX4 scales down: in a hover S - 1 went to -0.3, and the heading 4 deg off. Both fields are averaged first.
 """
 
 import math
@@ -22,8 +25,11 @@ from flownav.core.measurement import Array
 from flownav.logs.mavlink.framing import Message
 
 MILLI = 1e-3  # SCALED_IMU has thousandths of gauss
-LEAST_PAIRS = 15  # by which the difference at the start is known: chosen, a second of PX4's magnetometer
+LEAST_PAIRS = 15  # whose median is the difference at the start: chosen, a second of PX4's magnetometer
 APART_S = 0.1  # the two are of one instant: chosen
+AVERAGED_S = 0.5  # time constant of both fields' average: chosen, noise of .03 gauss at 50 Hz is .004 then
+SETTLED_S = 1.5  # until the averages have forgotten the first reading: chosen, three time constants
+GAP_S = 1.0  # after one the average begins anew: chosen
 SCALED_BY = 0.1  # sigma of each element of S - 1: chosen, PX4's own calibrations are within it
 FIRST_GAUSS = 0.002  # sigma of the difference at the start: chosen
 CREEPS = 0.005  # sigma of what EKF2's bias moves [gauss/sqrt(s)]: chosen, it learns .06 gauss in tens of seconds
@@ -41,8 +47,9 @@ class Field:
 
     def clear(self) -> None:
         """Begin anew."""
-        self._own: Vector | None = None
-        self._own_s = self._read_s = math.nan
+        self._own: Vector | None = None  # both are averages
+        self._stated: Vector | None = None
+        self._own_s = self._stated_s = self._read_s = self._since_s = math.nan
         self._pairs: deque[tuple[Vector, Vector]] = deque(maxlen=LEAST_PAIRS)  # own field and difference
         self._first: Vector | None = None  # the difference at the start, of the field _first_own
         self._first_own: Vector = (0.0, 0.0, 0.0)
@@ -53,13 +60,15 @@ class Field:
     def sensed(self, message: Message, t_s: float) -> None:
         """A SCALED_IMU; three zeros are no magnetometer."""
         if message.xmag or message.ymag or message.zmag:
-            self._own = MILLI * message.xmag, MILLI * message.ymag, MILLI * message.zmag
-            self._own_s = t_s
+            own = MILLI * message.xmag, MILLI * message.ymag, MILLI * message.zmag
+            self._own, self._own_s = averaged(self._own, own, t_s - self._own_s), t_s
 
     def restored(self, stated: Vector, t_s: float) -> Vector:
         """A field of HIGHRES_IMU, with what EKF2 has taken off since the start put back."""
+        average = averaged(self._stated, stated, t_s - self._stated_s)
+        self._stated, self._stated_s = average, t_s
         if self._own is not None and self.comparable and abs(t_s - self._own_s) <= APART_S:
-            self._compare(self._own, _less(stated, self._own), math.hypot(*stated), t_s)
+            self._compare(self._own, _less(average, self._own), math.hypot(*stated), t_s)
         if self._first is None or not self.comparable:
             return stated
         x, y, z = self._known[0].tolist()
@@ -71,13 +80,23 @@ class Field:
             regressors = np.array([1.0, *_less(own, self._first_own)])
             self._known, self._covariance = learnt(self._known, self._covariance, regressors, np.array(off))
         else:
+            self._since_s = t_s if not self._pairs else self._since_s
             self._pairs.append((own, off))
-            if len(self._pairs) == LEAST_PAIRS:
+            if len(self._pairs) == LEAST_PAIRS and t_s - self._since_s >= SETTLED_S:
                 owns, offs = zip(*self._pairs, strict=True)
                 self._first_own, self._first = _middle(owns), _middle(offs)
                 self._known[0] = self._first
                 self.comparable = math.hypot(*self._first) <= MOST_SHARE * strength
         self._read_s = t_s
+
+
+def averaged(before: Vector | None, value: Vector, step_s: float) -> Vector:
+    """The running average of a field after a value that came step_s after the last."""
+    if before is None or not 0.0 <= step_s < GAP_S:
+        return value
+    share = -math.expm1(-step_s / AVERAGED_S)
+    x, y, z = (a + share * (b - a) for a, b in zip(before, value, strict=True))
+    return x, y, z
 
 
 def learnt(known: Array, covariance: Array, regressors: Array, value: Array) -> tuple[Array, Array]:

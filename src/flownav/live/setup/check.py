@@ -104,7 +104,7 @@ def check(
         written = {change.name for change in report.changes if change.done}
         if rebooting := [row.name for row in after.rows if row.reboot and row.name in written]:
             report.notes.insert(
-                0, f"Reboot the vehicle, then run this again: {', '.join(rebooting)} count from then on."
+                0, f"Reboot the vehicle, then run this again; read at boot only: {', '.join(rebooting)}."
             )
             report.verdict += "; the vehicle must be rebooted"
     if send in ("odometry", "vision"):

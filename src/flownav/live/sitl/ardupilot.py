@@ -1,5 +1,6 @@
 """ArduPilot's simulator: copter and traditional helicopter."""
 
+import math
 import time
 from collections.abc import Sequence
 from contextlib import suppress
@@ -22,6 +23,7 @@ STICKS = (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1000)
 STREAMS_HZ = {108: TRUTH_HZ, 32: LOCAL_HZ, 245: 4.0}
 LOGGING = {"LOG_BACKEND_TYPE": 1.0, "LOG_DISARMED": 1.0}  # from its start, the ground before take-off with it
 EXTERNAL = 2.0  # source set on flownav
+FLOW_NOISE_RAD_S, FLOW_HZ = 0.05, 10.0  # SIM_FLOW_RND, SIM_FLOW_RATE
 
 
 class ArduPilot(Pilot):
@@ -29,6 +31,8 @@ class ArduPilot(Pilot):
 
     vehicles: ClassVar = ("heli", "copter")
     log_pattern: ClassVar = "logs/*.BIN"
+    flow_sigma_rad_s: ClassVar = FLOW_NOISE_RAD_S / math.sqrt(3.0)  # even between +-FLOW_NOISE (AP_OpticalFlow_SITL)
+    flow_hz: ClassVar = FLOW_HZ
 
     def connected(self) -> Wire:
         """A wire on free ports of our own, which are given to the simulator."""

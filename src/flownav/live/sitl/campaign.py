@@ -165,7 +165,17 @@ def _one(task: Task) -> dict[str, Any]:
 
 
 # -- the table --------------------------------------------------------------------------------------------------
-OF_ALL = ("hover_rms_m", "error_rms_m", "error_m", "error_down_m", "unsaid_s", "silent_s", "strayed_m")
+OF_ALL = (
+    "height_m",
+    "floor_m",
+    "hover_rms_m",
+    "error_rms_m",
+    "error_m",
+    "error_down_m",
+    "unsaid_s",
+    "silent_s",
+    "strayed_m",
+)
 
 
 def row_of(cell: str, flights: Sequence[dict[str, Any]]) -> dict[str, Any]:

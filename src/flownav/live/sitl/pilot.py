@@ -59,6 +59,8 @@ class Pilot(ABC):
     vehicles: ClassVar[tuple[str, ...]]
     live_arguments: ClassVar[tuple[str, ...]] = ()
     height_m: ClassVar[float] = 5.0
+    flow_sigma_rad_s: ClassVar[float]  # noise of the flow sensor that the flight has, and its readings a second
+    flow_hz: ClassVar[float]
     log_pattern: ClassVar[str]  # of the autopilot's own logs below its folder
     logs = False  # whether it writes one
 

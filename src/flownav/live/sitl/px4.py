@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from flownav.core.errors import InputError
-from flownav.live.sitl.eyes import FlowSensor, Receiver
+from flownav.live.sitl.eyes import EXPOSURE_S, NOISE_RAD_S, FlowSensor, Receiver
 from flownav.live.sitl.pilot import MODE, POSITION_AND_YAW, NotFlown, Pilot
 from flownav.live.sitl.tables import Eyes, faults_of, parameters_of
 from flownav.live.sitl.wire import Wire, free_port
@@ -27,6 +27,8 @@ class Px4(Pilot):
 
     vehicles: ClassVar = ("quad",)
     log_pattern: ClassVar = "log/**/*.ulg"
+    flow_sigma_rad_s: ClassVar = NOISE_RAD_S
+    flow_hz: ClassVar = 1.0 / EXPOSURE_S
     target_every: ClassVar = 1  # offboard mode wants it twice a second at least
     target_mask: ClassVar = POSITION_AND_YAW
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from flownav.core.frames import rotation_from_quaternion
 from flownav.core.measurement import Array
-from flownav.live.sitl.flight import Flown
+from flownav.live.sitl.flight import PILOTS, Flown
 from flownav.logs.mavlink.position_messages import local_position_m
 
 GAP_S = 0.3  # a longer one between two estimates is one of sending
@@ -25,7 +25,8 @@ def figures(flown: Flown) -> dict[str, Any]:
     when the hover began (GPS's own) or at the last counted reset; without GPS from the start. unsaid_s: how long an
     error beyond WRONG_M was sent without a counted reset. own_rms_m, own_down_rms_m: of the place that the autopilot
     believed in, in the hover. touchdown_m: from the place of take-off. strayed_m: farthest from the path that was
-    commanded. silent_s: the longest gap in sending.
+    commanded. silent_s: the longest gap in sending. height_m: of the hover, above the place of take-off; floor_m: see
+    `drift_floor_m`.
     """
     facts: dict[str, Any] = {
         "autopilot": flown.order.autopilot, "scenario": flown.order.scenario, **flown.order.case._asdict(),
@@ -44,11 +45,14 @@ def figures(flown: Flown) -> dict[str, Any]:
     hovering = truth[(truth[:, 0] >= hover_s) & (truth[:, 0] < until_s)]
     off_m = np.hypot(*(hovering[:, 1:3] - begin[:2]).T)
     at_end = truth[-1]
+    height_m = -float(hovering[:, 3].mean()) if len(hovering) else NAN
     landed = flown.landed and -at_end[3] < HIGH_M and at_end[4] > TILTED
     flew = truth[(truth[:, 0] >= hover_s)]
     facts |= {
         "landed": bool(landed),
         "hover_rms_m": _rms(off_m),
+        "height_m": height_m,
+        "floor_m": drift_floor_m(flown, height_m, until_s - hover_s),
         "strayed_m": _strayed_m(flew[:, 1:3], flown.path_ne_m, begin[:2]),
         "highest_m": float(-flew[:, 3].min()),
         "touchdown_m": float(np.hypot(*at_end[1:3])) if landed else None,
@@ -56,6 +60,14 @@ def figures(flown: Flown) -> dict[str, Any]:
     }
     facts |= _of_autopilot(flown, truth, hover_s, until_s)
     return facts | _of_estimate(flown, truth, hover_s, until_s, end_s if end_s == end_s else last_s)
+
+
+def drift_floor_m(flown: Flown, height_m: float, lasts_s: float) -> float:
+    """Level drift rms over a hover that the noise of its flow sensor alone integrates to: no estimate without another
+    reference is better in the mean of many flights; one flight is off by less or by more.
+    """
+    pilot = PILOTS[flown.order.autopilot]
+    return pilot.flow_sigma_rad_s * height_m * math.sqrt(lasts_s / pilot.flow_hz)
 
 
 def _of_estimate(flown: Flown, truth: Array, hover_s: float, until_s: float, end_s: float) -> dict[str, Any]:

@@ -59,6 +59,7 @@ def test_the_front_page_is_a_sentence_an_install_ten_lines_of_python_and_the_pic
     page = (DOCS / "index.md").read_text(encoding="utf-8")
     code = re.findall(r"```python\n(.*?)```", page, re.S)[0]
     assert len(code.strip().splitlines()) == 10
+    assert max(map(len, code.splitlines())) <= 82  # more is cut off on a screen of 1600 px
     names = [node for node in ast.walk(ast.parse(code)) if isinstance(node, ast.Attribute)]
     asked = {name.attr for name in names if isinstance(name.value, ast.Name) and name.value.id == "flownav"}
     assert asked <= set(flownav.__all__)
@@ -68,4 +69,10 @@ def test_the_front_page_is_a_sentence_an_install_ten_lines_of_python_and_the_pic
 
 def test_gallery_shows_every_picture():
     page = pictures.gallery()
-    assert page.count("![") == len(pictures.PICTURES)
+    assert page.count("![") == len(pictures.PICTURES) + 1
+    thumbnails = re.findall(r"^- \[!\[[^\]]+\]\(\.\./pictures/([\w-]+\.\w+)\)\]\(\.\./([\w/-]+)\.md\)$", page, re.M)
+    assert thumbnails[0] == ("landing.svg", "tutorials/first-landing")
+    assert thumbnails[1:] == [(f"{picture.name}.png", picture.page) for picture in pictures.PICTURES]
+    style = (DOCS / "assets" / "flownav.css").read_text(encoding="utf-8")
+    assert '<div class="flownav-gallery" markdown>' in page
+    assert re.search(r"\.flownav-gallery > ul \{\s+display: grid", style)

@@ -17,6 +17,7 @@ from flownav.report.landing import landing_picture
 from flownav.report.landing_scene import FRAMES
 from flownav.report.path_picture import path_picture
 from flownav.report.sureness import three_sigma
+from flownav.scoring.phases import NAMES
 from report_records import flight, navigated, replay
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -122,6 +123,35 @@ def test_the_phases_colour_the_path():
     assert all(re.search(r"phase-(\w+)", style)[1] in named for style in coloured)
 
 
+def test_the_vehicle_is_never_drawn_over_the_key_of_the_phases():
+    side, _, _ = views(landed())
+    key = [float(one.get("y")) for one in side.iter(f"{SVG}rect") if "phase" in (one.get("style") or "")]
+    moving = next(one for one in side.iter(f"{SVG}g") if one.get("class") == "moving vehicle")
+    skids_px = floats(moving.find(f"{SVG}animateTransform").get("values")).reshape(-1, 2)[:, 1].min()
+    scale = next(float(one.get("width")) for one in side.iter(f"{SVG}rect") if one.get("class") == "pad") / 3.0
+    assert max(key) + 10.0 < skids_px - 0.25 * scale  # the hub stands 0.25 m over the skids of this vehicle
+    assert len(key) == len({text.text for text in side.iter(f"{SVG}text")} & set(NAMES))
+
+
+def test_wind_is_clear_of_the_pad():
+    _, above, _ = views(landed())
+    pad = next(one for one in above.iter(f"{SVG}rect") if one.get("class") == "pad")
+    words = next(one for one in above.iter(f"{SVG}text") if one.get("class") == "windtext")
+    arrow = next(one for one in above.iter(f"{SVG}g") if one.find(f"{SVG}path[@class='wind']") is not None)
+    assert float(words.get("y")) + 4.0 < float(pad.get("y"))
+    assert floats(arrow.get("transform"))[1] + 15.0 < float(pad.get("y"))  # half its length below its middle
+
+
+def test_the_heading_of_the_side_view_is_below_a_whole_turn():
+    record = landed()
+    truth = record.tables["truth"]
+    half = np.radians(-0.2) / 2.0
+    truth |= {"qw": np.full(len(truth["t_s"]), np.cos(half)), "qz": np.full(len(truth["t_s"]), np.sin(half))}
+    truth |= {name: np.zeros(len(truth["t_s"])) for name in ("qx", "qy")}
+    title = next(one.text for one in views(record)[0].iter(f"{SVG}text") if one.get("class") == "title")
+    assert title.endswith("heading 0°")
+
+
 def test_many_flights_give_the_ring_and_their_dots():
     assert not [one for view in views(landed()) for one in view.iter() if one.get("class") == "ring"]
     many = {"flights": 48, "r95_m": 0.5, "north_m": [0.1, 0.2, -0.3], "east_m": [0.0, 0.1, 0.2]}
@@ -156,6 +186,9 @@ def test_alone_it_brings_its_colours_and_its_quadrotor():
     assert "prefers-color-scheme:dark" in picture.svg
     assert "var(--truth)" in picture.svg
     assert "--truth:#" in picture.svg
+    ground = next(one for one in ElementTree.fromstring(picture.svg).iter(f"{SVG}rect"))
+    assert ground.get("class") == "ground"  # dark ink on a page that is light, and the other way round, is read on it
+    assert ".landing .ground{fill:var(--surface)}" in picture.svg
     _, above, _ = views(record, alone=True)
     still = next(one for one in above.iter(f"{SVG}g") if one.get("class") == "still vehicle")
     assert len(still.findall(f"{SVG}circle")) == 4
@@ -176,6 +209,11 @@ def test_the_first_lines_say_whether_it_landed_where_how_sure_and_what_limited_i
     touchdown["broken"] = ["sinking at 2 m/s"]
     assert headline(record).startswith("It crashed 0.370 m from the pad's centre: sinking at 2 m/s.")
     assert headline(replay()) == ""
+    many = {"flights": 48, "r95_m": 0.5, "north_m": [0.1] * 47, "east_m": [0.0] * 47}
+    assert headline(landed(many=many, flight=6)).startswith(
+        "47 of 48 flights touched the ground, 95 % within 0.500 m of the pad's centre. This is flight 6, "
+    )
+    assert headline(landed(many={**many, "r95_m": None})).startswith("47 of 48 flights touched the ground. ")
     assert "Filter landing" not in render(record)
     assert "Simulated" in flown_with(record)
     assert "seed" in flown_with(record)
@@ -185,7 +223,12 @@ def test_a_log_has_its_path_with_the_cut_of_gps_and_its_height_by_phase():
     record = replay()
     path, height = (view.find(f"{SVG}g") for view in ElementTree.fromstring(path_picture(record).svg))
     lines = {one.get("class"): floats(one.get("points")).reshape(-1, 2) for one in path.iter(f"{SVG}polyline")}
-    assert {"way of-estimate", "way of-gps", "cut"} <= set(lines)
+    assert {"way of-estimate", "cut"} <= set(lines)
+    readings = next(one for one in path.iter(f"{SVG}path") if one.get("class") == "way of-gps")
+    assert re.fullmatch(r"(M[-\d.]+ [-\d.]+h0)+", readings.get("d"))  # dots, which no line joins
+    assert len(lines["way of-estimate"]) > 0
+    spread = np.ptp(floats(readings.get("d")).reshape(-1, 3)[:, :2], axis=0)
+    assert spread == pytest.approx(np.ptp(lines["way of-estimate"], axis=0), rel=0.1)
     estimate, cut = record.tables["estimate"], series.outages(record)[0]
     inside = (np.asarray(estimate["t_s"]) >= cut[0]) & (np.asarray(estimate["t_s"]) <= cut[1])
     whole, part = lines["way of-estimate"], lines["cut"]

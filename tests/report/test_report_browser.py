@@ -339,6 +339,56 @@ def test_paper_gets_light_figures_that_fit_and_all_details(browser: Any, pages: 
     visit.context.close()
 
 
+# Of every panel, pairs of words that lie on each other, and those that are cut off.
+CLASHES = """() => [...document.querySelectorAll(".row")].flatMap((row) => {
+  const ends = [...row.querySelectorAll(".end")].filter((end) => end.innerText.trim());
+  const boxes = ends.map((end) => end.getBoundingClientRect());
+  const title = row.querySelector(".row-title").getBoundingClientRect();
+  const chips = row.querySelector(".chips");
+  const cut = ends.flatMap((end) => [...end.children]).filter((word) => word.scrollWidth > word.clientWidth + 1);
+  const over = boxes.flatMap((a, k) => boxes.slice(k + 1).filter((b) =>
+    a.left < b.right && b.left < a.right && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 3));
+  const under = chips && chips.getBoundingClientRect().top < title.top + row.querySelector(".row-title").scrollHeight - 2;
+  return [...cut.map((word) => `cut: ${word.textContent}`), ...over.map(() => `over: ${row.innerText}`),
+          ...(under ? [`title: ${row.innerText}`] : [])];
+})"""
+
+
+@pytest.mark.parametrize("width", [1440, 390])
+def test_words_beside_curves_are_whole_and_clear_of_each_other(
+    browser: Any, pages: dict[str, Path], width: int
+) -> None:
+    visit = Visit(browser, pages["landing"], width=width)
+    assert len(visit.page.evaluate("[...document.querySelectorAll('.row .end')].map((end) => end.innerText)")) > 20
+    assert visit.page.evaluate(CLASHES) == []
+    visit.context.close()
+
+
+def test_the_picture_stands_in_one_row_on_paper_and_tables_are_whole(browser: Any, pages: dict[str, Path]) -> None:
+    visit = Visit(browser, pages["landing"], width=688)  # A4 less its margins
+    views = "[...document.querySelectorAll('.landing-views svg')].map((view) => view.getBoundingClientRect().top)"
+    assert len(set(visit.page.evaluate(views))) > 1  # a narrow screen has them under each other
+    visit.page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    visit.page.emulate_media(media="print")
+    assert len(visit.page.evaluate(views)) == 3
+    assert len(set(visit.page.evaluate(views))) == 1
+    assert visit.page.evaluate("document.querySelector('.landing-picture').getBoundingClientRect().bottom") < 900
+    cut = "[...document.querySelectorAll('#accuracy .scroll')].filter((one) => one.scrollWidth > one.clientWidth + 1)"
+    assert visit.page.evaluate(f"{cut}.map((one) => one.getAttribute('aria-label'))") == []
+    visit.context.close()
+
+
+def test_a_wide_band_at_rest_or_for_a_moment_does_not_flatten_the_flight(takeoff: Visit) -> None:
+    reach = """(zoomed) => {
+      const phase = flight.facts.phases.find((one) => one.name === "ground");
+      const t = Float64Array.from({ length: 2000 }, (_, k) => flight.facts.t0 + k * (flight.facts.t1 - flight.facts.t0) / 2000);
+      const v = t.map((at, k) => (at <= phase.t1 || k > 1950 ? 100 : 1));
+      return axes.reach({ series: [{ kind: "band", t, v, m: null }] }, zoomed, [flight.facts.t0, flight.facts.t1]);
+    }"""
+    assert takeoff.page.evaluate(reach, False) == pytest.approx([-1.12, 1.12])
+    assert takeoff.page.evaluate(reach, True) == pytest.approx([-112.0, 112.0])
+
+
 def test_what_stands_higher_is_drawn_first(landing: Visit) -> None:
     visit = landing
     drawn = visit.page.evaluate("window.drawnInOrder")

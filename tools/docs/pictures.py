@@ -36,16 +36,21 @@ INTRODUCTION = """# Gallery
 Every picture of these pages, with the page that explains it and the function that draws it. `make pictures` draws them
 anew from the code.
 """
+LANDING = (
+    "- [![The landing of a whole mission from the side, from above and close up](../pictures/landing.svg)]"
+    "(../tutorials/first-landing.md)\n  The landing of a whole mission, with the touchdowns of 48 flights. "
+    "[Your first landing](../tutorials/first-landing.md). Drawn by tools/docs/readme_picture.py."
+)
 
 
 def gallery() -> str:
-    """The page that shows every picture."""
+    """The page of thumbnails, the landing first, each a link to the page that explains it."""
     parts = [
-        f"![{picture.shows}](../pictures/{picture.name}.png)\n\n{picture.shows} "
+        f"- [![{picture.shows}](../pictures/{picture.name}.png)](../{picture.page}.md)\n  {picture.shows} "
         f"[{_title(picture.page)}](../{picture.page}.md). Drawn by {picture.made_by}."
         for picture in PICTURES
     ]
-    return INTRODUCTION + "\n" + "\n\n".join(parts) + "\n"
+    return f'{INTRODUCTION}\n<div class="flownav-gallery" markdown>\n\n' + "\n".join([LANDING, *parts]) + "\n\n</div>\n"
 
 
 def draw_all(folder: Path, names: list[str]) -> None:

@@ -3,14 +3,17 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flownav.core.measurement import COLUMNS, Array, Sensor
 from flownav.core.record import Record, mapping
 from flownav.report.chart import Stack
 from flownav.report.panels import Panel
 from flownav.report.series import moments, outages, start_end_s, track
+from flownav.scoring.phases import phases_of
 
 INNOVATION_NUMBERS = ("t_s", "observation_variance", "innovation", "innovation_variance", "test_ratio", "fused")
+ON_GROUND = ("ground", "landed")  # phases in which nobody navigates
 SMALLEST_RATIO = 0.01  # test ratios below are not drawn: the axis is logarithmic
 AXIS_TITLES = {
     "pos_n_m": "x, north (m)",
@@ -131,7 +134,7 @@ def _innovation_panel(record: Record, sensor: str, components: dict[str, dict[st
         if "innovation_variance" in part:
             expected = 3.0 * np.sqrt(np.maximum(part["innovation_variance"], 0.0))
             stack.band(row, "±3\N{GREEK SMALL LETTER SIGMA} expected", t_s, expected)
-            stack.within(row, _reach(part["innovation"], expected))
+            stack.within(row, _reach(part["innovation"], expected[in_flight(record, t_s)]))
         stack.dots(row, colour, "fused", t_s[fused], part["innovation"][fused])
         stack.crosses(row, "alert", "not fused", t_s[~fused], part["innovation"][~fused])
         if tested and "test_ratio" in part:
@@ -151,10 +154,22 @@ def _innovation_panel(record: Record, sensor: str, components: dict[str, dict[st
     return Panel(f"innovation-{sensor}", title, caption, f"{title}: {caption}", figure)
 
 
+def in_flight(record: Record, t_s: Array) -> NDArray[np.bool_]:
+    """Which instants (n,) are in no phase on the ground; all of a record that has no other."""
+    found = phases_of(record)
+    flown = np.ones(len(t_s), bool)
+    for phase in found if any(phase.name not in ON_GROUND for phase in found) else []:
+        if phase.name in ON_GROUND:
+            flown &= (t_s < phase.t0) | (t_s > phase.t1)
+    return flown
+
+
 def _reach(innovation: Array, expected: Array) -> float:
-    """Half the height of an axis that shows every innovation, and the band but for its rare spikes."""
+    """Half the height of an axis that shows every innovation, and 90 % of the band in flight: at rest and next to the
+    ground it may be a hundred times as wide.
+    """
     known = expected[np.isfinite(expected)]
-    shown = [np.abs(innovation[np.isfinite(innovation)]), np.quantile(known, [0.98]) if len(known) else known]
+    shown = [np.abs(innovation[np.isfinite(innovation)]), np.quantile(known, [0.9]) if len(known) else known]
     return 1.1 * float(np.max(np.concatenate(shown), initial=1e-6))
 
 

@@ -297,5 +297,6 @@ def ground_track(record: Record) -> Panel:
         return Panel(key, title, absent="The record holds no positions.")
     caption = f"From above, {paths.main()[1]} coloured by time. Point at it to move to that instant."
     caption += f" The pad is {paths.pad.size_m:g} m square." if paths.pad else ""
+    caption += f" {PLACED}" if has(record, "flown") else ""
     return Panel(key, title, caption, f"Path over the ground from above: {listed(paths.names())}.",
                  PathsView(paths, "above"))  # fmt: skip

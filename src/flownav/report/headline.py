@@ -12,7 +12,7 @@ FLOWN_ON = {"estimate": "steered by the navigator's estimate", "truth": "steered
 
 
 def headline(record: Record) -> str:
-    """One or two sentences on the landing; "" of a record that was not to land."""
+    """A few sentences on the landing, and on the flights that it is one of; "" of a record that was not to land."""
     scores = mapping(record.manifest.get("scores"))
     landing = mapping(scores.get("touchdown"))
     contact = mapping(landing.get("contact"))
@@ -34,7 +34,18 @@ def headline(record: Record) -> str:
     if place and known:
         most = max(known, key=lambda words: known[words])
         sentences.append(f"The largest part of that distance is due to {most} ({metres(known[most])} m).")
-    return " ".join(sentences)
+    return " ".join([*_of_many(record), *sentences])
+
+
+def _of_many(record: Record) -> list[str]:
+    """How the flights ended of which the record is the median one; nothing of a flight by itself."""
+    many = mapping(record.manifest.get("many"))
+    places, r95_m = many.get("north_m"), many.get("r95_m")
+    if not _is_number(many.get("flights")) or not isinstance(places, list):
+        return []
+    within = f", 95 % within {metres(float(r95_m))} m of the pad's centre" if _is_number(r95_m) and r95_m else ""
+    this = f"This is flight {record.manifest.get('flight', 0)}, whose largest error is the median."
+    return [f"{len(places)} of {many['flights']} flights touched the ground{within}.", this]
 
 
 def flown_with(record: Record) -> str:

@@ -18,7 +18,7 @@ from flownav.report.panels import metres
 from flownav.report.style import FONT, PALETTE
 
 LOOP_S, CLOSE_S = 5.0, 3.0
-HIGH_PX, SIDE_PX, ABOVE_PX, CLOSE_PX, GAP_PX = 360, 380, 360, 300, 20
+HIGH_PX, SIDE_PX, ABOVE_PX, CLOSE_PX, GAP_PX, MARGIN_PX = 360, 380, 360, 300, 20, 14
 ROUND_M = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
 WIDEST_PX = 0.4 * HIGH_PX  # a tube that is wider would only tint the picture
 TUBE_ELLIPSES = 60  # that a tube of 3 sigma is made of
@@ -59,23 +59,26 @@ def side_by_side(views: Sequence[tuple[str, int]], words: str) -> str:
 
 
 def one_svg(views: Sequence[tuple[str, int]], words: str) -> str:
-    """Views beside each other in one SVG, which has its colours on light and on dark."""
+    """Views beside each other in one SVG, which has its colours and its ground on light and on dark."""
     wide = sum(width for _, width in views) + GAP_PX * (len(views) - 1)
     starts = [sum(width + GAP_PX for _, width in views[:k]) for k in range(len(views))]
     inside = "".join(f'<g transform="translate({x} 0)">{view}</g>' for x, (view, _) in zip(starts, views, strict=True))
+    around = 2 * MARGIN_PX
+    box = f"{-MARGIN_PX} {-MARGIN_PX} {wide + around} {HIGH_PX + around}"
+    ground = f'<rect class="ground" x="{-MARGIN_PX}" y="{-MARGIN_PX}" width="100%" height="100%" rx="10"/>'
     light, dark = (";".join(f"--{role}:{PALETTE[role][k]}" for role in ROLES) for k in (0, 1))
     return (
-        f'<svg class="landing" xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {wide} {HIGH_PX}" role="img" '
+        f'<svg class="landing" xmlns="http://www.w3.org/2000/svg" viewBox="{box}" role="img" '
         f'aria-label="{escape(words)}"><style>.landing{{{light};--font:{escape(FONT, quote=False)}}}'
         f"@media(prefers-color-scheme:dark){{.landing{{{dark}}}}}"
-        f"{(HERE / 'landing.css').read_text(encoding='utf-8')}</style>{inside}</svg>"
+        f"{(HERE / 'landing.css').read_text(encoding='utf-8')}</style>{ground}{inside}</svg>"
     )
 
 
 # -- the three views -----------------------------------------------------------------------------------------------
 def _side(s: Scene) -> str:
     """Height over the ground, seen across the vehicle's heading at the touchdown."""
-    scale = min(SIDE_PX / (2.0 * s.half_m), (HIGH_PX - 56.0) / (s.high_m + 0.1))
+    scale = min(SIDE_PX / (2.0 * s.half_m), (HIGH_PX - 74.0) / (s.high_m + 0.1))
     ground, middle = HIGH_PX - 26.0, 0.5 * SIDE_PX
 
     def at(course: Course) -> Array:
@@ -96,7 +99,7 @@ def _side(s: Scene) -> str:
         _moved(s.shape.side(scale), "ghost", s, estimated, np.degrees(-s.estimated.pitch)),
         _moved(s.shape.side(scale), "vehicle", s, truth, np.degrees(-s.truth.pitch)),
     ]
-    compass = f"nose to the right, heading {np.degrees(s.along) % 360.0:.0f}\N{DEGREE SIGN}"
+    compass = f"nose to the right, heading {round(float(np.degrees(s.along))) % 360}\N{DEGREE SIGN}"
     parts = [ticks, pad, _ways(s, at, radii), *moving, _phase_key(s)]
     return view(0, SIDE_PX, f"From the side, {compass}", "".join(parts))
 
@@ -185,14 +188,23 @@ def _tube(way: Array, radii: Array) -> str:
 
 
 def _phase_key(s: Scene) -> str:
-    """The colours of the phases that the picture shows."""
+    """The colours of the phases that the picture shows, over it."""
     t0, t1 = s.ways[0].t_s[0], s.ways[0].t_s[-1]
-    names = list(dict.fromkeys(phase.name for phase in s.phases if phase.t0 < t1 and phase.t1 > t0))
-    return "".join(
-        f'<rect x="{SIDE_PX - 84}" y="{30 + 16 * k}" width="10" height="10" rx="2" '
-        f'style="fill:var(--phase-{escape(name)})"/><text x="{SIDE_PX - 70}" y="{39 + 16 * k}">{escape(name)}</text>'
-        for k, name in enumerate(names)
-    )
+    return phase_key([phase.name for phase in s.phases if phase.t0 < t1 and phase.t1 > t0], 0.0, SIDE_PX)
+
+
+def phase_key(names: Sequence[str], left: float, right: float) -> str:
+    """The phases' colours and names, each once, between two places [px]; on a second line where the first is full."""
+    x, y, parts = left, 39.0, []
+    for name in dict.fromkeys(names):
+        wide = 20.0 + 6.9 * len(name)
+        x, y = (left, y + 16.0) if x + wide > right else (x, y)
+        parts.append(
+            f'<rect x="{x:.0f}" y="{y - 9:.0f}" width="10" height="10" rx="2" '
+            f'style="fill:var(--phase-{escape(name)})"/><text x="{x + 13:.0f}" y="{y:.0f}">{escape(name)}</text>'
+        )
+        x += wide
+    return "".join(parts)
 
 
 def _lines(truth: Array, estimated: Array) -> str:
@@ -202,6 +214,12 @@ def _lines(truth: Array, estimated: Array) -> str:
 def polyline(role: str, way: Array) -> str:
     """A line through places (n, 2) [px], those that are numbers."""
     return f'<polyline class="{role}" points="{_points(way)}"/>'
+
+
+def dots(role: str, way: Array) -> str:
+    """Dots at places (n, 2) [px], those that are numbers: readings, which no line joins."""
+    places = "".join(f"M{x:.1f} {y:.1f}h0" for x, y in way[np.isfinite(way).all(axis=1)])
+    return f'<path class="{role}" d="{places}"/>'
 
 
 def _points(way: Array) -> str:
@@ -237,10 +255,10 @@ def _cross(x: float, y: float, size: float) -> str:
 
 
 def _wind_arrow(wind: tuple[float, float]) -> str:
-    """An arrow along the wind, in a corner."""
+    """An arrow along the wind and its speed, over the pad's upper edge."""
     return (
-        f'<g transform="translate({ABOVE_PX - 44} 54) rotate({np.degrees(wind[1]):.0f})"><path class="wind" '
-        f'd="M0 17V-17m-6 9 6-9 6 9"/></g><text class="windtext" x="{ABOVE_PX - 44}" y="88" text-anchor="middle">'
+        f'<g transform="translate({ABOVE_PX - 20} 40) rotate({np.degrees(wind[1]):.0f})"><path class="wind" '
+        f'd="M0 15V-15m-6 8 6-8 6 8"/></g><text class="windtext" x="{ABOVE_PX - 44}" y="44" text-anchor="end">'
         f"wind {wind[0]:.1f} m/s</text>"
     )
 

@@ -11,7 +11,18 @@ import numpy as np
 from flownav.core.measurement import Array
 from flownav.core.record import Record
 from flownav.report.figures_states import Paths, paths_of
-from flownav.report.landing import HIGH_PX, ROUND_M, Picture, animated, polyline, scale_bar, side_by_side, view
+from flownav.report.landing import (
+    HIGH_PX,
+    ROUND_M,
+    Picture,
+    animated,
+    dots,
+    phase_key,
+    polyline,
+    scale_bar,
+    side_by_side,
+    view,
+)
 from flownav.report.series import Track, Window, at, is_north_known, start_end_s
 from flownav.scoring.phases import Phase, phases_of
 
@@ -71,7 +82,7 @@ def _map(shown: list[tuple[str, str, Track]], main: Track, paths: Paths, *, nort
 
     windows = (main.within(one) for one in paths.outages)
     cut = "".join(polyline("cut", placed(_even(part, 100).value)) for part in windows if len(part.t_s) > 1)
-    drawn = "".join(polyline(f"way of-{role}", placed(_even(path, MAP_POINTS).value)) for role, _, path in shown)
+    drawn = "".join(_drawn(role, placed(_even(path, MAP_POINTS).value)) for role, _, path in shown)
     rows = [(f"of-{role}", name) for role, name, _ in shown] + ([("cutkey", "GPS withheld")] if cut else [])
     key = "".join(
         f'<text class="key {role}" x="{MAP_PX - 4}" y="{38 + 15 * k}">{escape(name)}</text>'
@@ -94,13 +105,7 @@ def _height(shown: list[tuple[str, str, Track]], main: Track, phases: list[Phase
         return np.column_stack([left + across * (path.t_s - window[0]), bottom + up * (path.value[:, 2] + low)])
 
     bands = "".join(_band(phase, window, left, across, bottom) for phase in phases)
-    names = list(dict.fromkeys(phase.name for phase in phases if phase.t0 < window[1] and phase.t1 > window[0]))
-    starts = np.cumsum([left, *(18.0 + 7.0 * len(name) for name in names)])
-    key = "".join(
-        f'<rect x="{x:.0f}" y="30" width="10" height="10" rx="2" style="fill:var(--phase-{escape(name)})"/>'
-        f'<text x="{x + 13:.0f}" y="39">{escape(name)}</text>'
-        for x, name in zip(starts, names, strict=False)
-    )
+    key = phase_key([phase.name for phase in phases if phase.t0 < window[1] and phase.t1 > window[0]], left, HEIGHT_PX)
     step = next((size for size in (*ROUND_M, *FAR_M) if up * size >= 50.0), FAR_M[-1])
     marks = 0.0 + np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step
     ticks = "".join(
@@ -112,10 +117,15 @@ def _height(shown: list[tuple[str, str, Track]], main: Track, phases: list[Phase
         f'<text x="{left + across * (t - window[0]):.0f}" y="{HIGH_PX - 4}" text-anchor="{side}">{t:.0f} s</text>'
         for t, side in ((window[0], "start"), (0.5 * sum(window), "middle"), (window[1], "end"))
     )
-    drawn = "".join(polyline(f"way of-{role}", placed(_even(path, HEIGHT_POINTS))) for role, _, path in shown)
+    drawn = "".join(_drawn(role, placed(_even(path, HEIGHT_POINTS))) for role, _, path in shown)
     t_s = np.linspace(*_ends(main), FRAMES)
     dot = _dot(placed(Track(t_s, at(t_s, main))))
     return view(1, HEIGHT_PX, "Height over time, by phase of the flight", f"{bands}{ticks}{times}{drawn}{dot}{key}")
+
+
+def _drawn(role: str, way: Array) -> str:
+    """A path (n, 2) [px] in its role's colour: a line, or dots of a receiver's readings."""
+    return (dots if role == "gps" else polyline)(f"way of-{role}", way)
 
 
 def _band(phase: Phase, window: Window, left: float, across: float, bottom: float) -> str:

@@ -30,14 +30,34 @@ const axes = (() => {
     return Array.from({ length: Math.floor((last - first) / step) + 1 }, (_, k) => 10 ** (first + k * step));
   }
 
+  // Whether a band counts for its axis at an instant. On the ground it may run beyond: a vehicle at rest that nobody
+  // navigates states much, which would flatten the flight.
+  function counts(zoomed, [from, to]) {
+    const resting = (one) => one.name === "ground" || one.name === "landed";
+    const inSight = flight.facts.phases.filter((one) => one.t1 > from && one.t0 < to);
+    if (zoomed || inSight.every(resting)) return () => true;
+    const rests = inSight.filter(resting);
+    return (t) => !rests.some((one) => t >= one.t0 && t <= one.t1);
+  }
+
+  // How far a band widens its axis: all of it, or 90 % of the time where the rest is ten times as wide.
+  function widest(one, zoomed, [from, to]) {
+    if (one.kind !== "band") return Infinity;
+    const counted = counts(zoomed, [from, to]);
+    const wide = Array.from(one.v).filter((v, k) => Number.isFinite(v) && one.t[k] >= from && one.t[k] <= to && counted(one.t[k])).sort((a, b) => a - b);
+    const most = wide[Math.floor(0.9 * (wide.length - 1))] || 0;
+    return !zoomed && wide[wide.length - 1] > 10 * most ? most : wide[wide.length - 1] || 0;
+  }
+
   function reach(row, zoomed, [from, to]) {
     let low = Infinity;
     let high = -Infinity;
     for (const one of row.series) {
       if (one.hidden) continue;
+      const most = widest(one, zoomed, [from, to]);
       const first = Math.max(0, flight.before(one.t, from));
       for (let k = first; k < one.t.length && one.t[k] <= to; k++) {
-        const value = one.v[k];
+        const value = Math.min(one.v[k], most);
         if (!Number.isFinite(value) || (row.log && value <= 0)) continue;
         const middle = one.m ? one.m[k] : 0;
         const least = one.kind === "band" ? middle - value : value;

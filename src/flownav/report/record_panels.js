@@ -95,8 +95,8 @@ const panels = (() => {
     // Once uPlot has laid a row out: its labels and the instant.
     settle(row) {
       if (!row.plot || !row.cursor) return;
-      this.placeEnds(row);
       this.followRow(row, flight.t);
+      this.placeEnds(row); // as high as they are with their values
     }
 
     options(row, k, last, height) {
@@ -161,11 +161,18 @@ const panels = (() => {
       ctx.restore();
     }
 
-    word(ctx, text, x, y, room, role, dpr) {
+    word(ctx, text, x, y, room, role, dpr, halo = false) {
       ctx.font = FONT(10.5 * dpr);
       ctx.textAlign = "left";
       ctx.textBaseline = "alphabetic";
       if (ctx.measureText(text).width > room) return;
+      if (halo) {
+        ctx.setLineDash([]);
+        ctx.lineWidth = 3 * dpr;
+        ctx.lineJoin = "round";
+        ctx.strokeStyle = this.colour("surface");
+        ctx.strokeText(text, x, y);
+      }
       ctx.fillStyle = this.colour(role);
       ctx.fillText(text, x, y);
     }
@@ -196,7 +203,7 @@ const panels = (() => {
         let line = ends.findIndex((end) => end <= x);
         if (line < 0) line = ends.length;
         ends[line] = x + wide;
-        this.word(ctx, moment.name, x + 3 * dpr, bbox.top + (11 + 12 * line) * dpr, bbox.left + bbox.width - x, "muted", dpr);
+        this.word(ctx, moment.name, x + 3 * dpr, bbox.top + (11 + 12 * line) * dpr, bbox.left + bbox.width - x, "muted", dpr, true);
       }
       ctx.setLineDash([]);
       for (const one of row.series) {
@@ -257,7 +264,7 @@ const panels = (() => {
         const k = this.end(label.one);
         const value = k >= 0 ? label.one.v[k] + (label.one.m ? label.one.m[k] : 0) : NaN;
         const y = Number.isFinite(value) && !(row.log && value <= 0) ? plot.valToPos(value, "y") : 0;
-        return { label, y: Math.min(plot.over.clientHeight, Math.max(0, y)), high: label.chip.firstChild.textContent && label.value ? 28 : 14 };
+        return { label, y: Math.min(plot.over.clientHeight, Math.max(0, y)), high: label.chip.offsetHeight };
       });
       places.sort((a, b) => a.y - b.y);
       let free = -TITLE_PX;

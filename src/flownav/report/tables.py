@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from flownav.core.measurement import Array
 from flownav.core.record import Record, mapping
 from flownav.report import series
 from flownav.report.figures_innovation import SENSOR_TITLES
@@ -101,15 +102,24 @@ def events(record: Record, phases: Sequence[Phase] = ()) -> EventTables:
 
 
 MOST_LISTED = 200
+NAMED_BY_VALUE = {"parameter": "{detail} = {value}", "clipping": "{detail} samples so far"}
+USED = {"0": "no", "1": "yes"}
 
 
 def autopilot_rows(record: Record, phases: Sequence[Phase] = ()) -> list[Event]:
     """Events of an autopilot's log besides its sensors, in order of time: modes, messages, parameters set in it."""
     where = list(phases)
     return [
-        Event(t_s, (source, kind, detail, value), phase_at(where, t_s))
+        Event(t_s, (source, kind, _in_words(kind, detail, value), value), phase_at(where, t_s))
         for t_s, source, kind, detail, value in series.event_rows(record) if source == "autopilot"
     ][:MOST_LISTED]  # fmt: skip
+
+
+def _in_words(kind: str, detail: str, value: str) -> str:
+    """An autopilot's event in one column: a parameter with its value, whether its filter fuses flow as yes or no."""
+    if kind == "fuses flow":
+        return USED.get(detail, detail)
+    return NAMED_BY_VALUE.get(kind, "{detail}").format(detail=detail, value=value)
 
 
 def groups(tree: Any) -> list[tuple[str, list[tuple[str, str]]]]:
@@ -213,10 +223,18 @@ def sensor_rows(record: Record) -> list[tuple[str, ...]]:
     return rows
 
 
+def _read_s(record: Record, name: str) -> Array:
+    """When a sensor was read [s], in order: of its own table, or else of those that were offered to the filter."""
+    own, offered = (record.tables.get(table, {}) for table in (name, "innovation"))
+    t_s = np.asarray(own.get("t_s", ()), float)
+    if not len(t_s) and len(offered.get("sensor", ())):
+        t_s = np.unique(np.asarray(offered["t_s"], float)[np.asarray(offered["sensor"]) == name])
+    return np.sort(t_s[np.isfinite(t_s)])
+
+
 def _pace(record: Record, name: str) -> tuple[str, str]:
     """A sensor's mean rate [Hz] and its longest gap [s] between readings; dashes where the record lacks them."""
-    t_s = np.sort(np.asarray(record.tables.get(name, {}).get("t_s", ()), float))
-    t_s = t_s[np.isfinite(t_s)]
+    t_s = _read_s(record, name)
     if len(t_s) < 2 or t_s[-1] <= t_s[0]:
         return NONE, NONE
     return number((len(t_s) - 1) / float(t_s[-1] - t_s[0]), 1), number(float(np.max(np.diff(t_s))), 2)

@@ -66,7 +66,7 @@ def _wind(manifest: Mapping[str, Any], *, drawn: bool) -> str:
     stated = mapping(mapping(parameters.get("scenario")).get("wind")).get("speed_20ft_m_s")
     own = mapping(parameters.get("drawn")) if drawn else {}
     speed = own.get("wind.speed_20ft_m_s", stated)
-    return f" in {speed:g} m/s of wind" if speed else " in calm air" if speed == 0.0 else ""
+    return f" in {speed:.2g} m/s of wind" if speed else " in calm air" if speed == 0.0 else ""
 
 
 def _errors(scores: Mapping[str, Any]) -> list[str]:

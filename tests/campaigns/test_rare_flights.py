@@ -193,14 +193,14 @@ def test_a_missing_file_is_refused(setup, tmp_path):
 
 
 # -- responses ----------------------------------------------------------------------------------------
-LIMITS = Limits(*TouchdownLimits(2.0, 0.5, 10.0, 40.0, 0.4))
+LIMITS = Limits(*TouchdownLimits(2.0, 0.5, 10.0, 40.0, 0.4, np.inf))
 
 
 def rows_with(**touchdown):
     """A row of a landing that came to rest 0.2 m off, but for these columns of the touchdown."""
     row = dict.fromkeys(SCORE_COLUMNS, 0.1)
     row |= {"touchdown.expected": 1.0, "touchdown.broken": 0.0, "touchdown.go_arounds": 0.0, "touchdown.aloft": 0.0}
-    row |= {"touchdown.contact.distance_m": 0.2, "touchdown.contact.tilt_deg": 5.0}
+    row |= {"touchdown.beside": 0.0, "touchdown.contact.distance_m": 0.2, "touchdown.contact.tilt_deg": 5.0}
     row |= {f"touchdown.{name}": value for name, value in touchdown.items()}
     return np.array([[row[name] for name in SCORE_COLUMNS]])
 

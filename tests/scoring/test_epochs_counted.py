@@ -35,8 +35,32 @@ def test_epochs_without_contact_and_at_rest_are_counted_one_by_one():
     for count in (1, 2, STILL_EPOCHS - 1, STILL_EPOCHS, STILL_EPOCHS + 7):
         assert followed_through([False] * count)[0].untouched == count
         assert followed_through([True] * count)[0].still == count
-        assert followed_through([True] * count, lateral_m_s=0.03)[0].still == 0
-        assert followed_through([True] * count, yaw_deg_s=2.1)[0].still == 0
+        assert followed_through([True] * count, yaw_deg_s=15.1)[0].still == 0
+        assert followed_through([True] * count, yaw_deg_s=14.9)[0].still == count
+
+
+def followed_along(places, **changed):
+    """Memory of a vehicle on the ground that is at these places (north, east) one after the other."""
+    course, touch = nothing_yet(), no_touch()
+    for epoch, (north, east) in enumerate(places):
+        at = STANDING._replace(place_n=north, place_e=east, **changed)
+        course, touch = followed(course, touch, epoch, at)
+    return course
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_vehicle_that_rocks_on_its_skids_stands_and_one_that_slides_does_not(axis):
+    """Rocking at 2 Hz within 1.5 cm is up to 0.1 m/s; sliding at 0.04 m/s leaves the place within a second."""
+    t_s = 0.02 * np.arange(200)
+    places = np.full((200, 2), 5.0)
+    places[:, axis] += 0.0075 * np.sin(2.0 * np.pi * 2.0 * t_s)
+    assert followed_along(places, lateral_m_s=0.09).still == 200
+    places[:, axis] = 5.0 + 0.04 * t_s
+    assert followed_along(places).still < STILL_EPOCHS
+    places[:, axis] = 5.0 + np.where(t_s < 1.0, 0.0, 0.031)  # pushed once by more than 3 cm
+    assert followed_along(places).still == 150
+    places[:, axis] = 5.0 + np.where(t_s < 1.0, 0.0, 0.029)
+    assert followed_along(places).still == 200
 
 
 def test_a_go_around_is_counted_once_however_long_it_lasts():

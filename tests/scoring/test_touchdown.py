@@ -141,7 +141,7 @@ def test_rest_begins_when_the_last_motion_ends_and_is_where_the_flight_ends():
 @pytest.mark.parametrize(("moving", "rests"), [(50, True), (51, False)])
 def test_a_second_without_motion_is_rest(moving, rests):
     rate = landing().yaw_rate_deg_s.copy()
-    rate[FLYING : FLYING + moving] = 5.0
+    rate[FLYING : FLYING + moving] = 16.0
     found = flight(landing(yaw_rate_deg_s=rate))
     assert (found["rest"] is not None) == rests
     assert found["success"] == rests
@@ -280,3 +280,17 @@ def test_flights_that_were_to_land_and_did_not_are_failures_and_not_unsaid():
     assert many["unfinished"] == {"never touched": 5, "never at rest": 0}
     assert many["contact"]["r95_m"] is None
     assert many["limited_by"] == {"estimate_m": None, "guidance_m": None, "pad_m": None}
+
+
+# -- the pad that a camera was to find -----------------------------------------------------------------------------
+@pytest.mark.parametrize(("radius_m", "verdict"), [(5.01, "landed"), (4.99, "beside the pad"), (np.inf, "landed")])
+def test_who_stands_beside_the_pad_that_was_to_be_found_has_not_landed(radius_m, verdict):
+    """The vehicle of `landing` stands 3 m north and 4 m east of the pad's middle."""
+    row = row_of(landing(), limits=LIMITS._replace(pad_radius_m=radius_m))
+    assert verdict_of(row) == verdict
+    assert succeeded(row[None, :])[0] == (verdict == "landed")
+    both = touchdown_of_flights(np.vstack([row, row_of(landing())]))
+    assert both["success"]["rate"] == (1.0 if verdict == "landed" else 0.5)
+    assert both["rest"]["r95_m"] == pytest.approx(5.0)  # the distance counts as it is
+    assert both["unfinished"] == {"never touched": 0, "never at rest": 0}
+    assert both["broken"] == {}

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+import flownav
 from flownav.core.compile import LANES
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
@@ -36,6 +37,24 @@ def alone(tmp_path, entries, name="approach", **sections):
     head = 'schema_version = 1\nname = "few"\nprovenance = "test"\n[dispersion]\n'
     empty.write_text(head + entries, encoding="utf-8")
     return setup(name, dispersion={"file": str(empty)}, **sections)
+
+
+def test_a_direction_of_the_wind_that_is_asked_for_is_that_of_every_flight():
+    loaded = flownav.Scenario.load("approach")
+    for asked in ({"wind": "12:180"}, {"wind": {"from_direction_deg": 180.0}}, {"wind.from_direction_deg": 180.0}):
+        found = assemble(loaded.changed(**asked).file)
+        values = found.ensemble().values(1, 0, 8)
+        assert "wind.from_direction_deg" not in values
+        assert np.std(values["wind.speed_20ft_m_s"]) > 0.1  # the speed is still drawn
+        toward = [truth.wind.toward_n for truth in found.ensemble().truths(1, 0, 8)]
+        assert toward == pytest.approx([1.0] * 8)
+    assert len(set(assemble(loaded.changed(wind="12").file).ensemble().values(1, 0, 8)["wind.from_direction_deg"])) == 8
+
+
+def test_what_a_scenario_fixes_is_drawn_in_no_flight():
+    entries = setup("approach", dispersion={"fixed": ["wind.roughness_m", "ground.slope_deg"]}).dispersion
+    assert not {"wind.roughness_m", "ground.slope_deg"} & set(entries)
+    assert len(entries) == len(setup("approach").dispersion) - 2
 
 
 # -- what is drawn -----------------------------------------------------------------------------------------------

@@ -88,6 +88,7 @@ class Scenario:
         `filter="paper"`, `autopilot="truth"`, `vehicle="quad-450"`, `wind=8` or `wind="8:270"` (m/s at 20 ft, from the
         west). `vehicle` takes a Vehicle too, and `flow_sensor` a
         Sensor or a path. What is None is left as it is. A dotted name reaches inside: `{"flight.duration_s": 20.0}`.
+        A direction of the wind that is given is that of every flight, of an ensemble too.
         InputError, one line, for an unknown key and for a value out of its range.
 
         Example:
@@ -104,7 +105,8 @@ class Scenario:
         model = given.get("gps", {}).get("model") if isinstance(given.get("gps"), Mapping) else None
         if model is not None and model != self.file.gps.model:
             entries.pop("gps", None)  # another model has other numbers
-        return Scenario(check(merged(entries, given, self.name), File, f"{self.name}, as changed"))
+        changed = check(merged(entries, given, self.name), File, f"{self.name}, as changed")
+        return Scenario(_with_its_wind(changed) if _names_direction(given) else changed)
 
     @checked
     def save(self, path: str | Path) -> Path:
@@ -151,6 +153,9 @@ def _given(name: str, value: Any) -> Any:
     return {WORDS[name]: value} if name in WORDS and isinstance(value, str) else value
 
 
+DIRECTION = "wind.from_direction_deg"
+
+
 def wind_of(text: str) -> dict[str, float]:
     """The wind that "8" or "8:270" stands for: speed at 20 ft [m/s], and where it blows from [deg]. InputError
     otherwise.
@@ -161,6 +166,18 @@ def wind_of(text: str) -> dict[str, float]:
         return given | ({"from_direction_deg": float(direction)} if direction else {})
     except ValueError:
         raise InputError(f"{arg('wind')} {text}: m/s at 20 ft, and degrees where it blows from: 8, or 8:270") from None
+
+
+def _names_direction(given: Mapping[str, Any]) -> bool:
+    """Whether changes state where the wind blows from."""
+    wind = given.get("wind")
+    return DIRECTION in given or (isinstance(wind, Mapping) and DIRECTION.partition(".")[2] in wind)
+
+
+def _with_its_wind(file: File) -> File:
+    """The scenario with the wind from its own direction in all flights, whatever its dispersion draws."""
+    fixed = tuple(dict.fromkeys((*file.dispersion.fixed, DIRECTION)))
+    return file.model_copy(update={"dispersion": file.dispersion.model_copy(update={"fixed": fixed})})
 
 
 def _with_whole_paths(entries: dict[str, Any]) -> dict[str, Any]:

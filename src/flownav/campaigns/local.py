@@ -213,7 +213,7 @@ def judging_facts(flight: Flight) -> dict[str, Any]:
         "search_height_m": float(flight.gains.search_height_m),
         "starts_on_ground": bool(plan.starts_on_ground),
         "flown_on_truth": bool(plan.fly_on_truth),
-        "limits": {name: float(value) for name, value in flight.limits._asdict().items()},
+        "limits": {name: float(limit) for name, limit in flight.limits._asdict().items() if np.isfinite(limit)},
     }
 
 

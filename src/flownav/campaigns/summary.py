@@ -18,7 +18,7 @@ from flownav.scoring.errors import SCORE_COLUMNS, touchdown_rows
 from flownav.scoring.landings import EXPECTED
 from flownav.scoring.percentiles import share_with_interval
 
-VERDICTS = ("landed", "went_around", "crashed", "unfinished")
+VERDICTS = ("landed", "beside_the_pad", "went_around", "crashed", "unfinished")
 YES_OR_NO = ("crash", "not_landed")  # measures that say yes or no: their share is a figure
 WORST_FLIGHTS = 10  # flights that are named
 

@@ -118,7 +118,7 @@ def _touchdowns(made: list[Case], truth_model: str) -> str:
             rate, limited = landing["success"], landing["limited_by"]
             success = with_ends(100.0 * rate["rate"], (100.0 * rate["low"], 100.0 * rate["high"]), form=".1f")
             sizes = (_length(limited[name]) for name in ("estimate_m", "guidance_m", "pad_m"))
-            aloft = {"went around": landing["verdicts"].get("went around", 0)}
+            aloft = {name: landing["verdicts"].get(name, 0) for name in ("went around", "beside the pad")}
             failed = {**landing["unfinished"], **aloft, **landing["broken"]}
             why = ", ".join(f"{what} {count}" for what, count in failed.items() if count) or "-"
             radii = (_interval(landing[end], "r95") for end in ("contact", "rest"))

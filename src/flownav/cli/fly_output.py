@@ -144,6 +144,8 @@ def _landed_lines(landing: dict[str, Any], landed: int, flights: int) -> list[st
     lines += [f"not landed in time  {', '.join(late)}"] if late else []
     if around["flights"]:
         lines.append(f"went around  {around['flights']}, of which {around['landed']} landed after all")
+    if beside := landing["verdicts"].get("beside the pad", 0):
+        lines.append(f"at rest beside the pad  {beside}")
     if landing["broken"]:
         lines.append("crashes by  " + ", ".join(f"{name} {count}" for name, count in landing["broken"].items()))
     return lines

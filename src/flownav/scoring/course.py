@@ -9,7 +9,8 @@ from flownav.core.compile import equation, kernel
 from flownav.core.measurement import Array
 
 AIRBORNE_EPOCHS = 25  # half a second without contact: skids flutter at lift-off
-STILL_M_S, STILL_DEG_S = 0.02, 2.0
+# Standing: chosen. In wind a vehicle stands and rocks on its skids, within 1.5 cm and at up to 2 Hz.
+STANDS_WITHIN_M, STANDS_DEG_S = 0.03, 15.0
 ROLLED_OVER_DEG = 30.0  # beyond what any of our skids stands on
 
 
@@ -38,7 +39,7 @@ class Course(NamedTuple):
 
     contact: float  # its epoch, of the first since the last go-around; -1: none
     untouched: float  # epochs without contact
-    still: float  # epochs at rest on the ground
+    still: float  # epochs at rest: on the ground, at the place of the first of them
     sink_m_s: float  # of the last epoch, with the five that follow
     lateral_m_s: float
     tilt_deg: float
@@ -52,6 +53,8 @@ class Course(NamedTuple):
     low: float  # 1: was below the ground
     away: float
     go_arounds: float
+    stood_n: float  # where it began to stand
+    stood_e: float
 
 
 class Touch(NamedTuple):
@@ -72,7 +75,7 @@ class Touch(NamedTuple):
 @equation
 def nothing_yet() -> Course:
     """Before the first epoch."""
-    return Course(-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Course(-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @equation
@@ -88,6 +91,12 @@ def lands(touches: bool, untouched: float) -> bool:
 
 
 @equation
+def near(north_m: float, east_m: float) -> bool:
+    """Whether a vehicle so far from where it began to stand still stands there."""
+    return north_m * north_m + east_m * east_m < STANDS_WITHIN_M * STANDS_WITHIN_M
+
+
+@equation
 def followed(c: Course, touch: Touch, epoch: int, s: Moving) -> tuple[Course, Touch]:
     """The memory with one epoch more."""
     seen_n, seen_e = (s.flown_n, s.flown_e) if epoch == 0 else (c.seen_n, c.seen_e)
@@ -97,15 +106,17 @@ def followed(c: Course, touch: Touch, epoch: int, s: Moving) -> tuple[Course, To
         s.place_n, s.place_e, s.flown_n, s.flown_e, seen_n, seen_e, c.sink_m_s, c.lateral_m_s, c.tilt_deg, c.yaw_deg_s
     )
     untouched = float(epoch + 1) if s.away else (0.0 if s.touches else c.untouched + 1.0)
-    still = s.touches and s.lateral_m_s < STILL_M_S and s.yaw_deg_s < STILL_DEG_S
+    stands = s.touches and s.yaw_deg_s < STANDS_DEG_S
+    still = stands and c.still > 0.0 and near(s.place_n - c.stood_n, s.place_e - c.stood_e)
     over = s.tilt_deg > ROLLED_OVER_DEG
     begins = s.away and c.away == 0.0 and epoch > 0
     now = Course(
-        contact, untouched, c.still + 1.0 if still else 0.0, s.sink_m_s, s.lateral_m_s, s.tilt_deg, s.yaw_deg_s,
-        s.place_n, s.place_e, s.flown_n if s.seen else seen_n, s.flown_e if s.seen else seen_e,
+        contact, untouched, c.still + 1.0 if still else (1.0 if stands else 0.0), s.sink_m_s, s.lateral_m_s,
+        s.tilt_deg, s.yaw_deg_s, s.place_n, s.place_e, s.flown_n if s.seen else seen_n, s.flown_e if s.seen else seen_e,
         1.0 if over and s.touches else c.over_grounded, 0.0 if contact < 0.0 else (1.0 if over else c.over_since),
         c.low if s.height_m > 0.0 else 1.0,  # a motion that is no number is no flight either
         1.0 if s.away else 0.0, c.go_arounds + 1.0 if begins else c.go_arounds,
+        c.stood_n if still else s.place_n, c.stood_e if still else s.place_e,
     )  # fmt: skip
     return now, first if met else touch
 

@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from flownav.core.record import mapping
-from flownav.scoring.landings import NEVER_LANDED, WENT_AROUND
+from flownav.scoring.landings import BESIDE_PAD, NEVER_LANDED, WENT_AROUND
+
+HOW = {"landed": "Landed", BESIDE_PAD: "Landed beside the pad,"}  # the outcomes of a flight that came to rest
 
 
 def length(metres: float) -> str:
@@ -46,7 +48,8 @@ def _one(landing: Mapping[str, Any]) -> str:
     if not away:
         return ""
     again = f" after {times} go-around{'s' * (times > 1)}" if times else ""
-    return f"{'Landed' if verdict == 'landed' else 'Touched, and not at rest when the flight ended,'} {away}{again}"
+    how = HOW.get(str(verdict), "Touched, and not at rest when the flight ended,")
+    return f"{how} {away}{again}"
 
 
 def _many(landing: Mapping[str, Any], scores: Mapping[str, Any]) -> str:

@@ -20,10 +20,11 @@ from flownav.scoring.touchdown import CONTACT, LIMITED_BY, REST, TOUCHDOWN_COLUM
 R_SHARE = 0.95
 NEVER_LANDED = "never landed"  # the verdict of one flight that was to land and never touched
 WENT_AROUND = "went around"  # of one that broke its landing off and is aloft at the end
+BESIDE_PAD = "beside the pad"  # of one that stands elsewhere than on the pad that its camera was to find
 AT_GATE_M = 0.35  # so near a gate's height a vehicle waits there: a search stays up to 0.3 m above its own
 CONFIDENCE = 0.95
-EXPECTED, BROKEN, GO_AROUNDS, ALOFT = (
-    TOUCHDOWN_COLUMNS.index(name) for name in ("expected", "broken", "go_arounds", "aloft")
+EXPECTED, BROKEN, GO_AROUNDS, ALOFT, BESIDE = (
+    TOUCHDOWN_COLUMNS.index(name) for name in ("expected", "broken", "go_arounds", "aloft", "beside")
 )
 
 
@@ -41,8 +42,9 @@ def crashed(rows: Array) -> NDArray[np.bool_]:
 
 
 def succeeded(rows: Array) -> NDArray[np.bool_]:
-    """Which flights that were to land came to rest on the ground with no limit broken."""
-    return np.asarray((rows[:, EXPECTED] > 0.0) & np.isfinite(rows[:, REST_DISTANCE]) & ~crashed(rows))
+    """Which flights that were to land came to rest with no limit broken, on the pad where a camera was to find one."""
+    rests = np.isfinite(rows[:, REST_DISTANCE]) & ~(rows[:, BESIDE] > 0.0)
+    return np.asarray((rows[:, EXPECTED] > 0.0) & rests & ~crashed(rows))
 
 
 def touchdown_of_flight(row: Array) -> dict[str, Any] | None:
@@ -115,11 +117,15 @@ def touches_of_flights(rows: Array, touchdown: Mapping[str, Any]) -> dict[str, A
 
 
 def verdict_of(row: Array) -> str:
-    """The outcome of a flight: landed, crashed, went around (and is aloft at the end), or none of these."""
+    """The outcome of a flight: landed, crashed, at rest beside the pad, went around (and is aloft at the end), or none
+    of these.
+    """
     if row[BROKEN] > 0.0:
         return "crashed"
     if succeeded(row[None, :])[0]:
         return "landed"
+    if row[BESIDE] > 0.0:
+        return BESIDE_PAD
     return WENT_AROUND if row[ALOFT] > 0.0 else "unfinished"
 
 

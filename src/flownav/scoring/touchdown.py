@@ -48,7 +48,8 @@ BROKEN = (
 )
 
 # one flight's touchdown as a row; expected 1: the flight was to land. broken: bits of BROKEN. go_arounds: how often it
-# broke its landing off; aloft 1: its last landing was broken off, and it is aloft at the end
+# broke its landing off; aloft 1: its last landing was broken off, and it is aloft at the end; beside 1: it is at rest
+# and not on the pad that its camera was to find
 TOUCHDOWN_COLUMNS = (
     *(f"contact.{name}" for name in CONTACT),
     *(f"rest.{name}" for name in REST),
@@ -57,19 +58,24 @@ TOUCHDOWN_COLUMNS = (
     "broken",
     "go_arounds",
     "aloft",
+    "beside",
 )
 COLUMNS = len(TOUCHDOWN_COLUMNS)
 NO_CONTACT, NO_REST, NO_PARTS = (np.nan,) * len(CONTACT), (np.nan,) * len(REST), (np.nan,) * len(LIMITED_BY)
 
 
 class Limits(NamedTuple):
-    """The limits of a vehicle's touchdown, from its file; beyond any of these it is a crash."""
+    """The limits of a vehicle's touchdown, from its file; beyond any of these it is a crash.
+
+    pad_radius_m: farther from the middle of the pad that its camera was to find it has not landed on it.
+    """
 
     max_sink_rate_m_s: float
     max_lateral_speed_m_s: float
     max_tilt_deg: float
     max_yaw_rate_deg_s: float
     max_slide_m: float
+    pad_radius_m: float = np.inf
 
 
 class Motion(NamedTuple):
@@ -148,7 +154,8 @@ def judged(c: Course, t: Touch, when: Timing, limits: Any) -> tuple[float, ...]:
     expected = 1.0 if when.may_land_after_s < when.last_s else 0.0
     aloft = 1.0 if not touched and c.go_arounds > 0.0 else 0.0
     found = (at_contact if touched else NO_CONTACT) + (at_rest if rests else NO_REST)
-    return found + (parts if touched else NO_PARTS) + (expected, bits, c.go_arounds, aloft)
+    beside = 1.0 if rests and hypotenuse(c.place_n, c.place_e) > limits.pad_radius_m else 0.0
+    return found + (parts if touched else NO_PARTS) + (expected, bits, c.go_arounds, aloft, beside)
 
 
 @equation

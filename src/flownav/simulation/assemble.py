@@ -98,7 +98,7 @@ def assemble(scenario: Scenario) -> Setup:
         settings=equipped.settings if equipped else np.zeros(0),
         initial_variance=_initial_variance(scenario, paper),
         linear=_linear_truth(paper, hover) if scenario.truth == "linear" and isinstance(hover, Trim) else None,
-        limits=touchdown_limits(file),
+        limits=touchdown_limits(file, math.inf if scenario.pad_fix is None else 0.5 * scenario.pad.size_m),
         learns=_learns(scenario, vehicle, hover),
     )
     described = kinds.describe_vehicle(own_file)

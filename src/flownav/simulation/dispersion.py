@@ -97,10 +97,12 @@ def _frozen(name: str, loc: float, scale: float, shapes: tuple[tuple[str, float]
 class DispersionSection(ParameterModel):
     """A scenario's `[dispersion]`. file: the entries that hold where the scenario names none of its own.
 
-    "shipped" is the file that ships with flownav. Entries may be nested tables, as TOML's dotted keys are.
+    "shipped" is the file that ships with flownav. Entries may be nested tables, as TOML's dotted keys are. fixed:
+    numbers that all flights have as the scenario states them, whatever the file draws, "wind.from_direction_deg".
     """
 
     file: str = SHIPPED
+    fixed: tuple[str, ...] = ()  # numbers by dotted name that are not drawn
     parameters: dict[str, Distribution] = Field(default_factory=dict)
 
     @model_validator(mode="before")
@@ -108,14 +110,15 @@ class DispersionSection(ParameterModel):
     def _flattened(cls, given: Any) -> Any:
         if not isinstance(given, Mapping) or isinstance(given.get("parameters"), Mapping):
             return given
-        file = {"file": given["file"]} if "file" in given else {}
-        entries = {name: table for name, table in given.items() if name != "file"}
-        return file | {"parameters": dict(leaves(entries, ""))}
+        own = {name: given[name] for name in ("file", "fixed") if name in given}
+        entries = {name: table for name, table in given.items() if name not in own}
+        return own | {"parameters": dict(leaves(entries, ""))}
 
     def entries(self) -> dict[str, Distribution]:
-        """The file's, and the scenario's own above them. InputError where the file is wrong."""
+        """The file's, and the scenario's own above them, less what is fixed. InputError where the file is wrong."""
         path = shipped(SHIPPED_FILE) if self.file == SHIPPED else Path(self.file)
-        return {**load(path, DispersionFile).dispersion.parameters, **self.parameters}
+        found = {**load(path, DispersionFile).dispersion.parameters, **self.parameters}
+        return {name: entry for name, entry in found.items() if name not in self.fixed}
 
 
 class DispersionFile(ParameterModel):
@@ -129,8 +132,8 @@ class DispersionFile(ParameterModel):
     @field_validator("dispersion")
     @classmethod
     def _is_whole(cls, section: DispersionSection) -> DispersionSection:
-        if "file" in section.model_fields_set:
-            raise ValueError("file: a dispersion file names no other one")
+        if {"file", "fixed"} & section.model_fields_set:
+            raise ValueError("file, fixed: a dispersion file names no other one, and leaves out what it does not draw")
         return section
 
 

@@ -98,18 +98,22 @@ class VehicleParameters(NamedTuple):
 
 
 class TouchdownLimits(NamedTuple):
-    """Limits of a touchdown that the vehicle withstands, as the file has them."""
+    """Limits of a touchdown that the vehicle withstands, as the file has them.
+
+    pad_radius_m: of the pad that a scenario's camera is to find; farther out the vehicle has not landed on it.
+    """
 
     max_sink_rate_m_s: float
     max_lateral_speed_m_s: float
     max_tilt_deg: float
     max_yaw_rate_deg_s: float
     max_slide_m: float
+    pad_radius_m: float
 
 
-def touchdown_limits(file: VehicleFile | MultirotorFile) -> TouchdownLimits:
+def touchdown_limits(file: VehicleFile | MultirotorFile, pad_radius_m: float = math.inf) -> TouchdownLimits:
     """The limits of a checked file."""
-    return TouchdownLimits(**file.touchdown.model_dump())
+    return TouchdownLimits(**file.touchdown.model_dump(), pad_radius_m=pad_radius_m)
 
 
 def of_either_kind(file: VehicleFile | MultirotorFile) -> dict[str, float]:

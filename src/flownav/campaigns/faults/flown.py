@@ -81,7 +81,7 @@ class Row(NamedTuple):
 
     def entry(self) -> dict[str, Any]:
         """The row as JSON has it."""
-        became = Counter(flight.verdict for flight in self.flights)
+        became = Counter(flight.verdict if flight.verdict in VERDICTS else "unfinished" for flight in self.flights)
         off = [flight.off_pad_m for flight in self.flights if flight.off_pad_m is not None]
         return {
             "fault": self.fault,

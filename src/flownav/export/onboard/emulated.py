@@ -27,6 +27,7 @@ class Convention(NamedTuple):
     pointer: int
 
 
+_UNICORN: Any = unicorn  # it names what it exports by a star
 _ARM = arm_const
 _A64 = arm64_const
 _X86 = x86_const
@@ -134,13 +135,13 @@ class Processor:
 def _engine(machine: int) -> Any:
     """An emulator with its floating-point unit switched on."""
     if machine == ARM:
-        engine = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB)
+        engine = _UNICORN.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB)
         engine.ctl_set_cpu_model(_ARM.UC_CPU_ARM_MAX)  # with the model of an M7 its FPU stays off
         engine.reg_write(_ARM.UC_ARM_REG_C1_C0_2, 0xF << 20)
         engine.reg_write(_ARM.UC_ARM_REG_FPEXC, 0x4000_0000)
     elif machine == AARCH64:
-        engine = unicorn.Uc(unicorn.UC_ARCH_ARM64, unicorn.UC_MODE_ARM)
+        engine = _UNICORN.Uc(unicorn.UC_ARCH_ARM64, unicorn.UC_MODE_ARM)
         engine.reg_write(_A64.UC_ARM64_REG_CPACR_EL1, 3 << 20)
     else:
-        engine = unicorn.Uc(unicorn.UC_ARCH_X86, unicorn.UC_MODE_64)
+        engine = _UNICORN.Uc(unicorn.UC_ARCH_X86, unicorn.UC_MODE_64)
     return engine

@@ -104,7 +104,8 @@ class LibraryBoard:
 
     def now(self, t_s: float) -> NowRow[Array]:
         """`flownav_now`."""
-        return now_row(self.now_numbers(t_s))
+        row: NowRow[Array] = now_row(self.now_numbers(t_s))
+        return row
 
     def digest(self) -> int:
         """`flownav_digest`."""
@@ -126,7 +127,8 @@ class NativeBoard(LibraryBoard):
         at[: len(values)] = values
 
     def get(self, at: Any, numbers: int) -> Array:
-        return at[:numbers].copy()
+        found: Array = at[:numbers].copy()
+        return found
 
     def call(self, symbol: str, *pointers: Any) -> int:
         return int(getattr(self._library, symbol)(*(ctypes.c_void_p(p.ctypes.data) for p in pointers)))
@@ -166,6 +168,11 @@ class EmulatedBoard(LibraryBoard):
         return self.processor.stack_used()
 
 
+def _exports_of(instance: Any, store: Any) -> Any:
+    """The memory, the numbers and the functions of a module, by name."""
+    return instance.exports(store)
+
+
 class WasmBoard(LibraryBoard):
     """A module in wasmtime, which counts its instructions if asked."""
 
@@ -178,7 +185,7 @@ class WasmBoard(LibraryBoard):
         self._store = wasmtime.Store(engine)
         if counts:
             self._store.set_fuel(FUEL)
-        self._exports = wasmtime.Instance(self._store, wasmtime.Module(engine, content), []).exports(self._store)
+        self._exports = _exports_of(wasmtime.Instance(self._store, wasmtime.Module(engine, content), []), self._store)
         self._memory = self._exports["memory"]
         self._heap = self._free = int(self._exports["heap"].value(self._store))
         super().__init__(settings, sizes)

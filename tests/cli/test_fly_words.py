@@ -32,7 +32,7 @@ def test_of_many_flights_the_parts_are_percentiles_that_add_as_vectors():
     many = {
         "contact": None, "rest": {"distance_m": spread, "t_s": spread, "r95_m": 0.0221, "r95_interval_m": (0.02, 0.03)},
         "limited_by": PARTS, "success": {"rate": 1.0, "low": 0.926, "high": 1.0}, "broken": {},
-        "went_around": {"flights": 0, "landed": 0}, "unfinished": {},
+        "went_around": {"flights": 0, "landed": 0}, "unfinished": {}, "verdicts": {"landed": 48},
     }  # fmt: skip
     lines = touchdown_lines(many, 48, 48)
     assert lines[2] == (

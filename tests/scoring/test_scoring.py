@@ -63,11 +63,13 @@ def test_a_flight_of_which_nothing_counts_has_null_scores():
 def test_many_flights_give_median_and_percentiles_in_the_same_layout():
     rows = np.tile(np.arange(101.0)[:, None], (1, len(SCORE_COLUMNS)))
     rows[:, SCORE_COLUMNS.index("touchdown.broken")] = 0.0
+    rows[:, SCORE_COLUMNS.index("touchdown.beside")] = 0.0
     rows[:3, SCORE_COLUMNS.index("touchdown.broken")] = 1.0
+    rows[3:5, SCORE_COLUMNS.index("touchdown.beside")] = 1.0
     scores = scores_of_flights(rows)
     assert scores["states"]["x"]["rms_error"] == {"median": 50.0, "p05": 5.0, "p95": 95.0}
     assert scores["touchdown"]["contact"]["sink_rate_m_s"]["median"] == 50.0
-    assert (scores["landed"], scores["crashed"]) == (98, 3)
+    assert (scores["landed"], scores["crashed"]) == (96, 3)
 
 
 @pytest.mark.parametrize(("number", "name"), [(5, "table5_takeoff.csv"), (6, "table6_landing.csv")])

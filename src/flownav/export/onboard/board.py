@@ -67,3 +67,4 @@ class Board:
 
 
 NOTHING = Given(0.0, 0, numbers_of(()))
+UNTOUCHED = 0xA5  # what a stack is painted with, to see how much of it is used

@@ -10,8 +10,8 @@ import unicorn
 from unicorn import arm64_const, arm_const, x86_const
 
 from flownav.core.measurement import Array
+from flownav.export.onboard.board import UNTOUCHED
 from flownav.export.onboard.elf import AARCH64, ARM, X86_64, Object, image_of
-from flownav.export.onboard.library_boards import UNTOUCHED
 
 CODE, RAM, RAM_BYTES, STACK_BYTES, STOP = 0x0800_0000, 0x2000_0000, 1 << 20, 1 << 16, 0x0900_0000
 PAGE = 0x1000

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from flownav.core.measurement import Array
-from flownav.export.onboard.board import NOTHING, Outcome
+from flownav.export.onboard.board import NOTHING, UNTOUCHED, Outcome
 from flownav.export.onboard.elf import read_object, shared_object
 from flownav.export.onboard.interface import SYMBOLS
 from flownav.export.onboard.package import Asked, code_of
@@ -25,7 +25,6 @@ from flownav.navigation.rows import EVENT_COLUMNS, INNOVATION_COLUMNS
 from flownav.navigation.waiting_records import READING
 
 HEAD = len(onboard.OutcomeHead._fields)
-UNTOUCHED = 0xA5  # what a stack is painted with, to see how much of it is used
 FUEL = 1 << 60  # of wasmtime: about one an instruction
 INNOVATIONS, EVENTS = onboard.MOST_INNOVATIONS * INNOVATION_COLUMNS, onboard.MOST_EVENTS * EVENT_COLUMNS
 

@@ -1,7 +1,7 @@
 """The picture of README and front page: the command that README names is run, and its landing drawn from its record.
 
-`readme_picture.py [OUT.svg]` writes docs/pictures/landing.svg and beside it landing-narrow.svg, for phones. It is run by
-hand when the picture or the flight changes.
+`readme_picture.py [OUT.svg]` writes docs/pictures/landing.svg and beside it landing-narrow.svg, for phones. It is
+run by hand when the picture or the flight changes.
 """
 
 from __future__ import annotations

@@ -49,10 +49,16 @@ def test_the_readmes_picture_is_of_the_command_that_it_names():
     command = readme_picture.command()
     assert command[0] == "fly"
     assert f"`flownav {' '.join(command)}`" in (PROJECT / "README.md").read_text(encoding="utf-8")
-    picture = (DOCS / "pictures" / "landing.svg").read_text(encoding="utf-8")
-    assert f"of {command[command.index('--flights') + 1]} flights" in picture
+    for name, shape in (("landing", "wide"), ("landing-narrow", "high")):
+        picture = (DOCS / "pictures" / f"{name}.svg").read_text(encoding="utf-8")
+        assert f"of {command[command.index('--flights') + 1]} flights" in picture
+        wide, high = map(float, re.findall(r'viewBox="[-\d.]+ [-\d.]+ ([\d.]+) ([\d.]+)"', picture)[0])
+        assert (wide > high) == (shape == "wide")
+        assert shape == "wide" or wide < 420  # its words are as large on a phone as they are drawn
     for page in (PROJECT / "README.md", DOCS / "index.md"):
-        assert "pictures/landing.svg)" in page.read_text(encoding="utf-8")
+        words = page.read_text(encoding="utf-8")
+        assert re.search(r'<source media="\(max-width: 600px\)" srcset="[\w/]*pictures/landing-narrow.svg">', words)
+        assert re.search(r'<img alt="[^"]+" src="[\w/]*pictures/landing.svg">', words)
 
 
 def test_the_front_page_is_a_sentence_an_install_ten_lines_of_python_and_the_picture():

@@ -348,8 +348,8 @@ CLASHES = """() => [...document.querySelectorAll(".row")].flatMap((row) => {
   const cut = ends.flatMap((end) => [...end.children]).filter((word) => word.scrollWidth > word.clientWidth + 1);
   const over = boxes.flatMap((a, k) => boxes.slice(k + 1).filter((b) =>
     a.left < b.right && b.left < a.right && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 3));
-  const under = chips &&
-    chips.getBoundingClientRect().top < title.top + row.querySelector(".row-title").scrollHeight - 2;
+  const ends_px = title.top + row.querySelector(".row-title").scrollHeight;
+  const under = chips && chips.getBoundingClientRect().top < ends_px - 2;
   return [...cut.map((word) => `cut: ${word.textContent}`), ...over.map(() => `over: ${row.innerText}`),
           ...(under ? [`title: ${row.innerText}`] : [])];
 })"""
@@ -382,9 +382,10 @@ def test_the_picture_stands_in_one_row_on_paper_and_tables_are_whole(browser: An
 def test_a_wide_band_at_rest_or_for_a_moment_does_not_flatten_the_flight(takeoff: Visit) -> None:
     reach = """(zoomed) => {
       const phase = flight.facts.phases.find((one) => one.name === "ground");
-      const { t0, t1 } = flight.facts, t = Float64Array.from({ length: 2000 }, (_, k) => t0 + k * (t1 - t0) / 2000);
+      const step = (flight.facts.t1 - flight.facts.t0) / 2000;
+      const t = Float64Array.from({ length: 2000 }, (_, k) => flight.facts.t0 + k * step);
       const v = t.map((at, k) => (at <= phase.t1 || k > 1950 ? 100 : 1));
-      return axes.reach({ series: [{ kind: "band", t, v, m: null }] }, zoomed, [t0, t1]);
+      return axes.reach({ series: [{ kind: "band", t, v, m: null }] }, zoomed, [flight.facts.t0, flight.facts.t1]);
     }"""
     assert takeoff.page.evaluate(reach, False) == pytest.approx([-1.12, 1.12])
     assert takeoff.page.evaluate(reach, True) == pytest.approx([-112.0, 112.0])

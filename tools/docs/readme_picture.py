@@ -1,6 +1,7 @@
 """The picture of README and front page: the command that README names is run, and its landing drawn from its record.
 
-`readme_picture.py [OUT.svg]` writes docs/pictures/landing.svg, run by hand when the picture or the flight changes.
+`readme_picture.py [OUT.svg]` writes docs/pictures/landing.svg and beside it landing-narrow.svg, for phones. It is
+run by hand when the picture or the flight changes.
 """
 
 from __future__ import annotations
@@ -34,10 +35,12 @@ def main(out: Path) -> None:
         record = Path(folder) / "flight.fnr"
         order = [sys.executable, "-m", "flownav", *command(), "--out", str(record), "--no-report"]
         subprocess.run(order, cwd=folder, check=True)
-        picture = landing_picture(Record.load(record), alone=True)
-    if picture is None:
-        raise ValueError(f"flownav {shlex.join(command())} did not land")
-    out.write_text(picture.svg, encoding="utf-8")
+        flown = Record.load(record)
+    for place, narrow in ((out, False), (out.with_stem(f"{out.stem}-narrow"), True)):
+        picture = landing_picture(flown, alone=True, narrow=narrow)
+        if picture is None:
+            raise ValueError(f"flownav {shlex.join(command())} did not land")
+        place.write_text(picture.svg, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -29,9 +29,9 @@ def meant(word: str, known: Iterable[str]) -> str:
 
 UNITS = {
     "rad_s": "rad/s", "m_s": "m/s", "deg_s": "°/s", "kg_m2": "kg m²", "kg_m3": "kg/m³", "n_m_rad": "N m/rad",
-    "n_m": "N/m", "n_s_m": "N s/m", "1_s": "1/s", "per_rad": "1/rad", "m2": "m²", "mrad": "mrad", "deg": "°",
-    "percent": "%", "mg": "mg", "ug_rthz": "µg/√Hz", "mgauss": "mG", "m": "m", "s": "s", "kg": "kg", "w": "W", "v": "V",
-    "ah": "Ah", "ohm": "Ω",
+    "n_m": "N/m", "n_s_m": "N s/m", "1_s": "1/s", "1_rad": "1/rad", "s_rad": "s/rad", "per_rad": "1/rad",
+    "m2": "m²", "mrad": "mrad", "deg": "°", "percent": "%", "mg": "mg", "ug_rthz": "µg/√Hz", "mgauss": "mG",
+    "m": "m", "s": "s", "kg": "kg", "w": "W", "v": "V", "ah": "Ah", "ohm": "Ω",
 }  # units at the end of a key, the longest that fits  # fmt: skip
 KEY_WORDS = {"wind.speed_20ft_m_s": "wind at 20 ft (m/s)", "wind.from_direction_deg": "wind from (°)"}
 
@@ -42,6 +42,8 @@ def key_words(key: str) -> str:
     Example:
         >>> key_words("vehicle.main_rotor.speed_rad_s"), key_words("noise"), key_words("wind.from_direction_deg")
         ('vehicle, main rotor: speed (rad/s)', 'noise', 'wind from (°)')
+        >>> key_words("vehicle.drive.governor_gain_s_rad")
+        'vehicle, drive: governor gain (s/rad)'
     """
     if key in KEY_WORDS:
         return KEY_WORDS[key]

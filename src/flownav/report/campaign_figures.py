@@ -206,9 +206,12 @@ def sensitivity(key: str, cell: dict[str, Any]) -> Panel | None:
         "hovertemplate": "%{x:.2f}<extra></extra>",
     }  # fmt: skip
     look = layout(90 + 26 * len(known_rows)) | {"hovermode": "closest"}
-    look["xaxis"] = axis("rank correlation with how far off it touched")
+    look["xaxis"] = axis("rank correlation") | {"tickangle": 0, "nticks": 4}  # a phone has room for no more
     look["yaxis"] = axis() | {"automargin": True, "nticks": len(known_rows)}
-    words = "The twelve strongest of Spearman's rank correlations, with 95 % intervals; grey: it may be nothing."
+    words = (
+        "The twelve strongest of Spearman's rank correlations with how far off it touched, with 95 % intervals; grey: "
+        "it may be nothing."
+    )
     return Panel(
         key, cell["label"], words, f"Rank correlations of the inputs of {cell['label']}", drawing([bars], look)
     )

@@ -36,6 +36,8 @@ def cloud_picture(cell: dict[str, Any], touched: Touchdowns) -> Picture | None:
     drawn = (
         f"rings about the pad's centre: {ring_words}" if rings else "too few touched for a ring that holds half of all"
     )
+    few = any(title == "R95" for title, *_ in rings) or known.sum() >= 0.95 * len(known)
+    drawn += "" if few else "; there is no R95, since fewer than 95 % of the flights touched without a crash"
     words = f"Where the flights of {cell['label']} first touched, north up; {drawn}."
     return Picture(side_by_side(views, words), words)
 

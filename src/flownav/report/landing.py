@@ -35,17 +35,18 @@ class Picture(NamedTuple):
     words: str
 
 
-def landing_picture(record: Record, *, alone: bool = False) -> Picture | None:
+def landing_picture(record: Record, *, alone: bool = False, narrow: bool = False) -> Picture | None:
     """The picture; None of a record without a touchdown beside a truth.
 
-    A page gets its views as SVGs that wrap where it is narrow; alone: one SVG for a file of its own, with its colours.
+    A page gets its views as SVGs that wrap where it is narrow; alone: one SVG for a file of its own, with its colours,
+    the views beside each other or, narrow, under each other.
     """
     scene = scene_of(record)
     if scene is None:
         return None
     views = [(_side(scene), SIDE_PX), (_above(scene), ABOVE_PX), (_close(scene), CLOSE_PX)]
     words = _words(scene)
-    return Picture(one_svg(views, words) if alone else side_by_side(views, words), words)
+    return Picture(one_svg(views, words, narrow=narrow) if alone else side_by_side(views, words), words)
 
 
 def side_by_side(views: Sequence[tuple[str, int]], words: str) -> str:
@@ -58,13 +59,17 @@ def side_by_side(views: Sequence[tuple[str, int]], words: str) -> str:
     return f'<div class="landing-views" role="img" aria-label="{escape(words)}">{inside}</div>'
 
 
-def one_svg(views: Sequence[tuple[str, int]], words: str) -> str:
-    """Views beside each other in one SVG, which has its colours and its ground on light and on dark."""
-    wide = sum(width for _, width in views) + GAP_PX * (len(views) - 1)
-    starts = [sum(width + GAP_PX for _, width in views[:k]) for k in range(len(views))]
-    inside = "".join(f'<g transform="translate({x} 0)">{view}</g>' for x, (view, _) in zip(starts, views, strict=True))
+def one_svg(views: Sequence[tuple[str, int]], words: str, *, narrow: bool = False) -> str:
+    """Views in a row, or narrow in a column, in one SVG, which has its colours and its ground on light and on dark."""
+    before = [[width + GAP_PX for _, width in views[:k]] for k in range(len(views))]
+    starts = [(0, (HIGH_PX + GAP_PX) * k) if narrow else (sum(before[k]), 0) for k in range(len(views))]
+    wide = max(x + width for (x, _), (_, width) in zip(starts, views, strict=True))
+    high = max(y + HIGH_PX for _, y in starts)
+    inside = "".join(
+        f'<g transform="translate({x} {y})">{view}</g>' for (x, y), (view, _) in zip(starts, views, strict=True)
+    )
     around = 2 * MARGIN_PX
-    box = f"{-MARGIN_PX} {-MARGIN_PX} {wide + around} {HIGH_PX + around}"
+    box = f"{-MARGIN_PX} {-MARGIN_PX} {wide + around} {high + around}"
     ground = f'<rect class="ground" x="{-MARGIN_PX}" y="{-MARGIN_PX}" width="100%" height="100%" rx="10"/>'
     light, dark = (";".join(f"--{role}:{PALETTE[role][k]}" for role in ROLES) for k in (0, 1))
     return (
@@ -195,10 +200,10 @@ def _phase_key(s: Scene) -> str:
 
 def phase_key(names: Sequence[str], left: float, right: float) -> str:
     """The phases' colours and names, each once, between two places [px]; on a second line where the first is full."""
-    x, y, parts = left, 39.0, []
+    x, y, parts = left, 35.0, []
     for name in dict.fromkeys(names):
         wide = 20.0 + 6.9 * len(name)
-        x, y = (left, y + 16.0) if x + wide > right else (x, y)
+        x, y = (left, y + 15.0) if x + wide > right else (x, y)
         parts.append(
             f'<rect x="{x:.0f}" y="{y - 9:.0f}" width="10" height="10" rx="2" '
             f'style="fill:var(--phase-{escape(name)})"/><text x="{x + 13:.0f}" y="{y:.0f}">{escape(name)}</text>'

@@ -28,7 +28,7 @@ from flownav.scoring.phases import Phase, phases_of
 
 MAP_PX, HEIGHT_PX = 440, 520
 MARGIN_PX = 24.0
-MAP_POINTS, HEIGHT_POINTS, FRAMES = 500, 300, 72
+MAP_POINTS, HEIGHT_POINTS, FRAMES = 1500, 300, 72
 LEAST_M = 2.0  # the smallest ground that is shown
 FAR_M = (50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0)
 

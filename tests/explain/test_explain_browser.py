@@ -12,8 +12,8 @@ import flownav
 from browsing import Visit
 from command import run
 from flownav.report.html import write_report
+from flownav.studies.explain.hypothesis import words
 from flownav.studies.explain.page import HEADINGS
-from flownav.studies.explain.table import words
 from planted.planted import written
 from planted_logs import fault
 

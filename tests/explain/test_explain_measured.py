@@ -115,6 +115,24 @@ def test_a_reference_whose_scale_is_wrong_makes_no_wrong_flow_beside_gps_and_imu
     assert found.figures["gain"] == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.parametrize(
+    ("reference", "inertial", "ratio"),
+    [
+        ((0.7, 0.02), (0.72, 0.02), 0.70),  # both see it
+        ((0.7, 0.02), None, 0.70),
+        ((0.31, 0.30), (0.87, 0.05), 1.0),  # a reference that is turned against the vehicle
+        ((0.98, 0.02), (0.6, 0.05), 1.0),  # an accelerometer that lies
+        (None, (0.6, 0.02), 0.60),
+        (None, (0.9, 0.02), 1.0),
+        (None, None, 1.0),
+    ],
+)
+def test_axes_read_apart_by_what_each_witness_knows(monkeypatch, reference, inertial, ratio):
+    monkeypatch.setattr(flow_signs, "_ratio_by_reference", lambda _: reference)
+    monkeypatch.setattr(flow_signs, "_ratio_by_inertial", lambda _: inertial)
+    assert flow_signs._uneven(spoilt_yard()) == pytest.approx(ratio, abs=0.02)
+
+
 def test_inav_has_one_factor_that_grows_with_the_gain():
     sign = Sign(2.0, (0.0, 1.0), {"gain": 0.8, "x": 0.8, "y": 0.8, "read": "0.80 of what it should"})
     (factor,) = flow_cures.scale(Case(Log(yard().path, {}, parameters={"opflow_scale": 12.0})), sign, "inav").settings

@@ -199,3 +199,14 @@ def test_vibration_is_also_what_the_vehicle_says_itself():
         found = body_signs.vibration(Case(Log(Path("log"), streams, happened=told)))
         assert isinstance(found, Sign)
         assert found.strength == pytest.approx(strength)
+
+
+@pytest.mark.parametrize(("wash_m", "serves"), [(0.0, True), (2.0, True), (-2.0, True), (5.0, False), (-5.0, False)])
+def test_a_barometer_that_left_the_range_at_take_off_does_not_show_later_that_the_range_is_stuck(wash_m, serves):
+    t_s = np.arange(0.0, 60.0, 0.05)
+    range_m = 0.06 + np.clip(0.5 * (t_s - 10.0), 0.0, 1.5)
+    washed = np.where(t_s > 10.0, wash_m, 0.0)
+    case = up_and_down(range_m, t_s, range_m - 0.06 + washed)
+    assert height_signs._rose_with_it(case, case.other_heights["barometer"]) == serves
+    aloft = up_and_down(range_m + 2.0, t_s, range_m + washed)  # a log that begins in flight shows no take-off
+    assert height_signs._rose_with_it(aloft, aloft.other_heights["barometer"])

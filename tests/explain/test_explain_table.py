@@ -12,6 +12,7 @@ from flownav.live.sitl.tables import faults_of
 from flownav.logs.open_log import open_log
 from flownav.studies.explain.judge import explain
 from flownav.studies.explain.table import BY_NAME
+from places import PROJECT
 from planted.planted import LISTS, Planted, listed
 from planted.results import Flown, Recorded, Result, page, without_flown
 
@@ -91,3 +92,10 @@ def test_every_flown_fault_is_one_that_the_simulator_has_and_its_cause_one_that_
         if flight.fault:
             assert flight.fault.partition("@")[0] in faults_of(flight.autopilot)
         assert flight.command(Path("out")).count("--vehicle") == 1
+
+
+def test_every_cause_has_its_page_in_the_navigation_under_its_title():
+    navigation = (PROJECT / "mkdocs.yml").read_text(encoding="utf-8")
+    for name, row in BY_NAME.items():
+        assert f'- "{row.words["title"]}": explanation/causes/{name}.md' in navigation
+    assert navigation.count("explanation/causes/") == len(BY_NAME)

@@ -9,8 +9,9 @@ import pytest
 
 from flownav.core.measurement import Sensor, Stream
 from flownav.logs.log import Log
+from flownav.studies.explain.hypothesis import words
 from flownav.studies.explain.judge import explain, probability_of
-from flownav.studies.explain.table import BY_NAME, HYPOTHESES, words
+from flownav.studies.explain.table import BY_NAME, HYPOTHESES
 from planted_logs import fault, log_of, sound
 
 # one of each sensor and kind of trial; `make explain` has them all

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from test_identification_flight import GAIN_X, GAIN_Y, written
 
+from flownav.lab.identification.first_look import judged
 from flownav.lab.identification.flight_identification import identify_flight
 from flownav.lab.identification.quantities import CANDIDATES
+from flownav.lab.identification.reference_truth import drift_throughout
+from flownav.logs.open_log import open_flight
 
 FROM_S, TO_S = 70.2, 85.0
 
@@ -59,3 +62,21 @@ def test_what_is_wrong_with_the_reference_is_named_and_the_gains_are_right(tmp_p
         assert min(abs(float(word) - FROM_S) for word in note.split() if word[0].isdigit()) < 1.1
     for response, gain in zip(found.responses, (GAIN_X, GAIN_Y), strict=True):
         assert response.gain.value == pytest.approx(gain, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("axis", "speed", "offset"), [(0, 0.08, 0.0), (1, -0.15, 0.0), (0, 0.0, 0.0), (0, 0.0, 0.06)]
+)  # m/s, rad/s
+def test_a_reference_that_drifts_all_the_time_gives_the_flow_no_offset(tmp_path, axis, speed, offset):
+    folder = written(tmp_path / "flight", turned_rad=0.0)
+    tables = {name: np.genfromtxt(folder / name, delimiter=",", names=True) for name in ("truth.csv", "flow.csv")}
+    tables["truth.csv"][("x_m", "y_m")[axis]] += speed * tables["truth.csv"]["t_s"]
+    tables["flow.csv"]["flow_y_rad_s"] += offset
+    for name, table in tables.items():
+        header = ",".join(table.dtype.names)
+        np.savetxt(folder / name, np.array(table.tolist()), delimiter=",", header=header, comments="", fmt="%.9g")
+    flown, moved, _, _ = judged(open_flight(folder), "truth")
+    drift = drift_throughout(flown, moved)
+    assert drift == (pytest.approx(abs(speed), abs=0.02) if speed else None)
+    found = identify_flight(folder, CANDIDATES).offset
+    assert (found is not None and found.matters) == bool(offset)

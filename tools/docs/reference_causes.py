@@ -11,8 +11,9 @@ from flownav.core.version import __version__
 from flownav.logs.log import Log
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.cure import Cure
+from flownav.studies.explain.hypothesis import Hypothesis
 from flownav.studies.explain.sign import Sign
-from flownav.studies.explain.table import BY_NAME, HYPOTHESES, Hypothesis
+from flownav.studies.explain.table import BY_NAME, HYPOTHESES
 
 MEASURED = Path(__file__).parents[2] / "docs" / "explanation" / "explained.md"
 NAMES = {"px4": "PX4", "ardupilot": "ArduPilot"}

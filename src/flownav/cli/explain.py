@@ -85,6 +85,8 @@ def _show(found: dict[str, Any]) -> None:
     for number, one in enumerate(found["causes"]):
         if number:
             say(f"Also: {one['sentence']} ({one['t0_s']:.0f} to {one['t1_s']:.0f} s)")
+        if one["beside_replay"]:
+            say(one["beside_replay"])
         if one["cure"]["parameters"]:
             say(table_of(CURE, one["cure"]["parameters"], left=1))
         if one["cure"]["by_hand"]:

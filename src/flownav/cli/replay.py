@@ -173,10 +173,11 @@ def error_lines(scores: dict[str, Any]) -> list[str]:
 
 def autopilot_errors(scores: dict[str, Any]) -> str:
     """The errors of an autopilot's own estimate (scoring/autopilot) in words, where it was compared with anything."""
-    against = {"truth": "the reference, turned and shifted onto it", "gps": "GPS, mean difference taken out"}
+    from flownav.scoring.path import AGAINST
+
     velocity = "" if scores["velocity_rms_m_s"] is None else f"; velocity {scores['velocity_rms_m_s']:.3f} m/s rms"
     return (
-        f"against {against[scores['against']]}: horizontal {scores['horizontal_rms_m']:.2f} m rms, "
+        f"against {AGAINST[scores['against']]}: horizontal {scores['horizontal_rms_m']:.2f} m rms, "
         f"{scores['horizontal_max_m']:.2f} m max; vertical {scores['vertical_rms_m']:.2f} m rms{velocity}"
     )
 

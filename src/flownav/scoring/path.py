@@ -163,37 +163,62 @@ def end_drift_of(estimate: Motion, known: References) -> float | None:
 
 # -- the autopilot's own estimate --------------------------------------------------------------------------------
 LEAST_ROWS = 10
+AGAINST = {"truth": "the reference, turned and shifted onto it", "gps": "GPS, mean difference taken out"}
 
 
-def autopilot_errors(estimate: Table, truth: Table | None, gps: Mapping[Sensor, Stream]) -> dict[str, Any]:
-    """Errors of an estimate's position and velocity; None each where there is nothing to compare with.
+class Offsets(NamedTuple):
+    """An estimate less its reference: against "truth" or "gps", instants (n,), north, east, down [m] (n, 3).
+
+    placed: how the truth was turned and shifted onto the estimate; None against GPS, whose mean difference is out.
+    """
+
+    against: str
+    t_s: Array
+    error: Array
+    placed: Alignment | None
+
+
+def autopilot_offsets(estimate: Table, truth: Table | None, gps: Mapping[Sensor, Stream]) -> Offsets | None:
+    """Where an estimate's position lies from its reference; None where there is nothing to compare with.
 
     Against truth, which is turned and shifted onto the estimate first; else against GPS, whose mean difference is
     taken out (the two have different origins). `gps` with its delays.
     """
     t_s, position = np.asarray(estimate["t_s"], float), columns_of(estimate, POSITION_NED)
-    velocity = velocity_ned(estimate)
     if truth is not None:
         reference_t_s, reference = np.asarray(truth["t_s"], float), columns_of(truth, POSITION_NED)
         covered = (reference_t_s >= t_s[0]) & (reference_t_s <= t_s[-1])
         if np.count_nonzero(covered) < LEAST_ROWS:
-            return _errors(None, np.zeros((0, 3)), np.nan, None)
+            return None
         placed = align(reference[covered] + difference_at(t_s, position, reference_t_s, reference), reference[covered])
         error = difference_at(t_s, position, reference_t_s, placed.moved(reference))
+        return Offsets("truth", reference_t_s[covered], error, placed)
+    if Sensor.GPS_POSITION not in gps:
+        return None
+    fixes = gps[Sensor.GPS_POSITION]
+    taken_s = fixes.t_s - fixes.delay_s
+    error = difference_at(t_s, position, taken_s, fixes.value)
+    error = error - error.mean(axis=0) if len(error) else error
+    return Offsets("gps", taken_s[(taken_s >= t_s[0]) & (taken_s <= t_s[-1])], error, None)
+
+
+def autopilot_errors(estimate: Table, truth: Table | None, gps: Mapping[Sensor, Stream]) -> dict[str, Any]:
+    """Errors of an estimate's position and velocity against the reference of `autopilot_offsets`; None each without."""
+    found = autopilot_offsets(estimate, truth, gps)
+    if found is None:
+        return _errors(None, np.zeros((0, 3)), np.nan, None)
+    t_s, velocity, placed = np.asarray(estimate["t_s"], float), velocity_ned(estimate), found.placed
+    if truth is not None and placed is not None:
+        reference_t_s, reference = np.asarray(truth["t_s"], float), columns_of(truth, POSITION_NED)
         moving = placed.turned(velocity_of(reference_t_s, reference))
         yaw_rad = placed.yaw_rad if placed.yaw_shown else None
-        return _errors("truth", error, _rms(t_s, velocity, reference_t_s, moving), yaw_rad)
-    if Sensor.GPS_POSITION not in gps:
-        return _errors(None, np.zeros((0, 3)), np.nan, None)
-    fixes = gps[Sensor.GPS_POSITION]
-    error = difference_at(t_s, position, fixes.t_s - fixes.delay_s, fixes.value)
-    error = error - error.mean(axis=0) if len(error) else error
+        return _errors("truth", found.error, _rms(t_s, velocity, reference_t_s, moving), yaw_rad)
     if Sensor.GPS_VELOCITY not in gps:
-        return _errors("gps", error, np.nan, None)
+        return _errors("gps", found.error, np.nan, None)
     speeds = gps[Sensor.GPS_VELOCITY]
     known = np.isfinite(speeds.value).all(axis=1)
     moving_rms = _rms(t_s, velocity, speeds.t_s[known] - speeds.delay_s, speeds.value[known])
-    return _errors("gps", error, moving_rms, None)
+    return _errors("gps", found.error, moving_rms, None)
 
 
 def placed_in(t_s: Array, position: Array, estimate: Table, gps: Mapping[Sensor, Stream]) -> Alignment | None:

@@ -9,6 +9,7 @@ reference, whose own delay the IMU gives; the better-known of the two.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -33,6 +34,7 @@ from flownav.lab.identification.reference_motion import (
     flow_likeness,
     with_flow,
 )
+from flownav.lab.identification.reference_truth import drift_throughout
 from flownav.lab.identification.scale import Match, against_speed, match
 from flownav.logs.log import Log
 from flownav.logs.open_log import open_flight
@@ -128,6 +130,11 @@ def measured(log: Log, reference: str = "auto") -> Measured:
         age_s = _age(flown, moved)
     scale, track = _scale(flown, moved, age_s, put_right)
     offset = flow_offset(flown, moved, put_right, scale.response, age_s)
+    drift_m_s = drift_throughout(flown, moved) if offset is not None and offset.matters else None
+    if drift_m_s is not None:
+        drifting = f"the reference: {flown.reference_name} drifts by {drift_m_s:.2f} m/s all the time"
+        note = f"{drifting}; no offset of the flow is identified"
+        flown, offset = replace(flown, notes=(*flown.notes, note)), None
     if offset is not None and offset.matters:
         put_right = without(put_right, flown.range_m, offset)
         scale, track = _scale(flown, moved, age_s, put_right)

@@ -19,6 +19,7 @@ STANDS_S, MOVING_M_S, BESIDE_S = 1.5, 0.3, 1.0
 BLOCK_S, LEAST_PIECE_S, LEAST_BLOCKS = 1.0, 12.0, 24
 DRIFT_M_S, TURN_RAD = 0.25, 0.2  # from which on a piece differs from the other
 BETTER = 0.6  # of the residual's power, that two pieces leave of one's
+CLEARLY_LESS = 0.8  # of the residual's power, that a drifting reference leaves of an offset's
 
 
 class Mended(NamedTuple):
@@ -63,7 +64,7 @@ def in_one_piece(flown: Flight, moved: Motion) -> Mended:
     """The piece of the flight before or after the reference begins to drift or is turned; all of it where it is not."""
     if flown.reference != "truth":  # a receiver's velocity is its own, and errs by as much for seconds
         return Mended(flown, ())
-    t_s, flow, reference = _blocks(flown, moved)
+    t_s, flow, reference, *_ = _blocks(flown, moved)
     if len(t_s) < LEAST_BLOCKS:
         return Mended(flown, ())
     whole = _fitted(flow, reference)
@@ -90,21 +91,61 @@ def in_one_piece(flown: Flight, moved: Motion) -> Mended:
     )
 
 
-def _blocks(flown: Flight, moved: Motion) -> tuple[Array, Array, Array]:
-    """Means over BLOCK_S of the flow's and the reference's level velocity in earth axes, as complex numbers (m,)."""
+def drift_throughout(flown: Flight, moved: Motion) -> float | None:
+    """The speed by which the reference drifts all the time [m/s]; None where the flow has an offset instead.
+
+    A drift is fixed in earth axes, an offset in the body's and grows with the range: turns and climbs tell them apart.
+    Where neither leaves clearly less of the difference it is taken for the flow's.
+    """
+    if flown.reference != "truth":
+        return None
+    t_s, flow, reference, ahead, lever = _blocks(flown, moved)
+    if len(t_s) < LEAST_BLOCKS:
+        return None
+    (_, _, drift), left = _solved(flow, ahead, reference - ahead, np.ones(len(t_s)))
+    _, by_offset = _solved(flow, ahead, reference - ahead, lever)
+    gain = abs(_fitted(flow, reference)[0])
+    return float(abs(drift) / gain) if left < CLEARLY_LESS * by_offset and gain > 1e-3 else None
+
+
+class _Blocks(NamedTuple):
+    """Means over BLOCK_S in earth axes, as complex numbers (m,): level velocity by the flow and by the reference, its
+    part along the vehicle's nose, and the velocity that an offset of 1 rad/s ahead makes.
+    """
+
+    t_s: Array
+    flow: Array
+    reference: Array
+    ahead: Array
+    lever: Array
+
+
+def _blocks(flown: Flight, moved: Motion) -> _Blocks:
+    """The flight's blocks, those that have readings."""
     t_s = flown.t_s[flown.good]
     seen = t_s - flown.age_s
-    earth = np.einsum("nij,nj->ni", flown.rotation(seen)[:, :2, :2], flown.velocity_m_s[flown.good])
+    level = flown.rotation(seen)[:, :2, :2]
+    earth = np.einsum("nij,nj->ni", level, flown.velocity_m_s[flown.good])
     reference = on_grid(moved.t_s, moved.velocity_m_s[:, :2], seen)
+    nose = level[:, :, 0] / np.linalg.norm(level[:, :, 0], axis=1)[:, None]
+    ahead = nose * np.sum(nose * reference, axis=1)[:, None]
+    lever = level[:, :, 0] * flown.range_m[flown.good, None]
     middles = np.arange(t_s[0] + BLOCK_S, t_s[-1] - BLOCK_S, BLOCK_S)
     after = np.clip(np.searchsorted(t_s, middles), 1, len(t_s) - 1)
     middles = middles[np.minimum(np.abs(middles - t_s[after - 1]), np.abs(t_s[after] - middles)) < 0.5 * BLOCK_S]
-    means = mean_over(t_s, np.column_stack([earth, reference]), middles - 0.5 * BLOCK_S, middles + 0.5 * BLOCK_S)
-    return middles, means[:, 0] + 1j * means[:, 1], means[:, 2] + 1j * means[:, 3]
+    columns = np.column_stack([earth, reference, ahead, lever])
+    means = mean_over(t_s, columns, middles - 0.5 * BLOCK_S, middles + 0.5 * BLOCK_S)
+    return _Blocks(middles, *(means[:, k] + 1j * means[:, k + 1] for k in range(0, 8, 2)))
 
 
 def _fitted(flow: Array, reference: Array) -> tuple[complex, complex, float]:
     """flow = gain reference + constant, all complex; and the residual's power."""
-    design = np.column_stack([reference, np.ones(len(reference))])
-    solution = np.linalg.lstsq(design, flow, rcond=None)[0]
-    return complex(solution[0]), complex(solution[1]), float(np.sum(np.abs(flow - design @ solution) ** 2))
+    (gain, constant), left = _solved(flow, reference, np.ones(len(reference)))
+    return complex(gain), complex(constant), left
+
+
+def _solved(flow: Array, *columns: Array) -> tuple[Array, float]:
+    """The complex factors of columns (m,) that make the flow, by least squares; and the residual's power."""
+    design = np.column_stack(columns)
+    factors = np.linalg.lstsq(design, flow, rcond=None)[0]
+    return factors, float(np.sum(np.abs(flow - design @ factors) ** 2))

@@ -243,6 +243,16 @@ class Case(Aloft):
             return None
 
     @cached_property
+    def measured_by_gps(self) -> Measured | None:
+        """The same against GPS beside a reference; None without either."""
+        if self.log.truth is None or self.gps_velocity is None:
+            return None
+        try:
+            return measured(self.log, "gps")
+        except (InputError, np.linalg.LinAlgError):
+            return None
+
+    @cached_property
     def own_gyro(self) -> OwnGyro | None:
         """How fast the flow sensor's own gyro turns beside the vehicle's."""
         return own_gyro(self.log)

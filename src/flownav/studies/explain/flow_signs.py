@@ -196,22 +196,44 @@ def _agreed(found: list[tuple[float, float]]) -> tuple[float, float]:
 
 
 def _uneven(case: Case) -> float:
-    """The gain of x over that of y, by a position reference, else by the inertial readings; 1 where they do not differ,
-    or are not known apart.
+    """The gain of x over that of y; 1 where they do not differ, or are not known apart.
+
+    By a position reference and by the inertial readings, each by how well it knows it.
     """
-    reference, fit = referenced(case), case.flow_fit
-    if reference is not None:
-        ratio = reference[0].value / reference[1].value
-        sigma = float(np.sqrt(sum((sigma_of(gain) / gain.value) ** 2 for gain in reference)))
-        return ratio if abs(np.log(ratio)) > UNEVEN_SIGMA * sigma else 1.0
+    reference, inertial, beyond = _ratio_by_reference(case), _ratio_by_inertial(case), float(np.log(UNEVEN))
+    if reference is None:
+        return 1.0 if inertial is None else _if_certain(*inertial, beyond)
+    if inertial is None:
+        return _if_certain(*reference)
+    by_inertial = float(np.hypot(inertial[1], 0.5 * beyond))  # with what the expectation itself may be off by
+    ratio, sigma = _agreed([(one, one * error) for one, error in (reference, (inertial[0], by_inertial))])
+    return _if_certain(ratio, sigma / ratio)
+
+
+def _if_certain(ratio: float, sigma: float, beyond: float = 0.0) -> float:
+    """A ratio, with its logarithm's standard error, where that is known to differ from 1 by over `beyond`; else 1."""
+    return ratio if abs(float(np.log(ratio))) > beyond + UNEVEN_SIGMA * sigma else 1.0
+
+
+def _ratio_by_reference(case: Case) -> tuple[float, float] | None:
+    """The gain of x over that of y and the standard error of its logarithm, by a position reference."""
+    reference = referenced(case)
+    if reference is None:
+        return None
+    sigma = float(np.sqrt(sum((sigma_of(gain) / gain.value) ** 2 for gain in reference)))
+    return reference[0].value / reference[1].value, sigma
+
+
+def _ratio_by_inertial(case: Case) -> tuple[float, float] | None:
+    """The same by the inertial readings, of a flow that is neither turned nor mirrored."""
+    fit = case.flow_fit
     if fit is None or _significance(fit) < 2.0 * SIGNIFICANT or case.expectation_reliability < LEAST_RELIABLE:
-        return 1.0
+        return None
     angle, _, mirrored = turn_of(fit.matrix)
     x, y = np.abs(np.diag(fit.matrix))
     if mirrored or abs(angle) > TURN_RAD or min(x, y) < 0.05:
-        return 1.0
-    error = float(np.hypot(fit.sigma[0, 0] / x, fit.sigma[1, 1] / y))
-    return float(x / y) if abs(np.log(x / y)) > np.log(UNEVEN) + UNEVEN_SIGMA * error else 1.0
+        return None
+    return float(x / y), float(np.hypot(fit.sigma[0, 0] / x, fit.sigma[1, 1] / y))
 
 
 def _read(gain: float, x: float, y: float) -> str:

@@ -14,6 +14,7 @@ NO_RANGE = Lack("no range")
 MISSING_S, NEAR_S, REACHED_SHARE, LEFT_SHARE = 3.0, 0.6, 0.8, 0.4
 STUCK_S, MOVED_M, BROKEN_S, LEAST_REPEATS = 1.5, 0.25, 0.5, 8
 FLAT_M, FLAT_STEP_S, FLAT_S = 0.06, 0.2, (3.0, 6.0, 12.0, 24.0)  # as near to one distance, for so long
+APART_M = 3.0  # twice what counts as wash
 FLAT_MOVED_M, ALONE = 0.9, 1.7  # by barometer and GPS; by one of them alone this factor more
 FLAT_QUICK_S, QUICK_MOVED_M = 4.0, 0.15  # of the accelerometer's own height
 JUMP_ROWS, JUMP_M, BY_JUMPS = 3, 0.4, (1.0, 1.6, 2.0)
@@ -104,8 +105,11 @@ def _flat(case: Case) -> Sign | None:
 
     The others: barometer and GPS, and what is quick of the accelerometer's own height.
     """
-    others = [of for name, of in case.other_heights.items() if name != "autopilot"]
-    if case.range_height is None or not others or case.inertial_velocity is None:
+    if case.range_height is None or case.inertial_velocity is None:
+        return None
+    heights = {name: of for name, of in case.other_heights.items() if name != "autopilot"}
+    others = [of for name, of in heights.items() if name != "barometer" or _rose_with_it(case, of)]
+    if not others:
         return None
     grid = np.arange(*case.flight_s, FLAT_STEP_S)
     known = gap_near(case.range_height[0], grid) < FLAT_STEP_S
@@ -119,6 +123,21 @@ def _flat(case: Case) -> Sign | None:
     theirs.append(np.cumsum(quick[:, 0]) * FLAT_STEP_S / QUICK_MOVED_M)
     found = [_flattest(grid, mine, theirs, round(lasts / FLAT_STEP_S)) for lasts in FLAT_S]
     return max((one for one in found if one is not None), key=lambda one: one.strength, default=None)
+
+
+def _rose_with_it(case: Case, other: tuple[Array, Array]) -> bool:
+    """Whether another height rose as the range did at take-off: a barometer in the wash shows no motion later on.
+
+    True where the log does not begin on the ground.
+    """
+    assert case.range_height is not None
+    t_s, height_m = case.range_height
+    begin_s = case.flight_s[0] + SPOOL_S
+    after = (t_s > begin_s) & (t_s < begin_s + BESIDE_S)
+    if case.ground_range_m == 0.0 or np.count_nonzero(after) < LEAST_PRESSURES:
+        return True
+    apart_m = np.interp(t_s[after], *other) - (height_m[after] - case.ground_range_m)
+    return bool(abs(float(np.median(apart_m))) < APART_M)
 
 
 def _flattest(grid: Array, mine: Array, theirs: list[Array], count: int) -> Sign | None:

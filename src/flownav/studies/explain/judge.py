@@ -11,18 +11,21 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.logs.log import Log
+from flownav.studies.explain.astray import Astray
 from flownav.studies.explain.autopilot_settings import dialect_of
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.cure import Cure, text_of
+from flownav.studies.explain.hypothesis import Hypothesis
+from flownav.studies.explain.replay_verdict import difference
 from flownav.studies.explain.sign import Found, Lack, Picture, Sign, Window
-from flownav.studies.explain.table import BY_NAME, HYPOTHESES, Hypothesis
+from flownav.studies.explain.table import BY_NAME, HYPOTHESES
 from flownav.studies.explain.trials import Trial, tried
 
 STEEPNESS, MIDDLE = 6.0, 1.0  # odds = (strength / MIDDLE) ** STEEPNESS
 LIKELY, SURE, SHOWN = 0.5, 0.95, 0.02
-ASTRAY_M = 1.0  # of the autopilot's own estimate, from which on the verdict states it
 TRIED_FROM, MOST_TRIED = 0.3, 8
 WORSE, WORSE_FACTOR = -0.5, 0.5  # a repair that makes the innovations worse by half speaks against the cause
+NAMED_LAST = -10.0  # of a rank
 STRONGEST, AS_SURE_AS_ANY = 6.0, 3.0
 
 
@@ -40,8 +43,9 @@ class Finding(NamedTuple):
     """A cause that is named.
 
     name, title, sentence; window_s: the seconds; probability; explained: share of the sensors' disagreement with the
-    path that the repair takes away (None where nothing could be replayed, or nothing disagrees); drift_m: of the
-    autopilot's own estimate meanwhile; figures: the numbers of the sentence; pictures; cure.
+    path that the repair takes away (None where nothing could be replayed, or nothing disagrees); astray: how far the
+    autopilot's own estimate was off meanwhile (None where nothing shows it); figures: the numbers of the sentence;
+    pictures; cure; beside_replay: why `flownav replay` calls the blamed sensor harmless all the same, else "".
     """
 
     name: str
@@ -50,10 +54,11 @@ class Finding(NamedTuple):
     window_s: Window
     probability: float
     explained: float | None
-    drift_m: float | None
+    astray: Astray | None
     figures: dict[str, float | str]
     pictures: tuple[Picture, ...]
     cure: Cure
+    beside_replay: str = ""
 
 
 class Explanation(NamedTuple):
@@ -79,9 +84,9 @@ class Explanation(NamedTuple):
             return f"Nothing wrong was found; {len(self.checked)} causes were looked for."
         t0, t1 = self.first.window_s
         phrases = [f"{t0:.0f} to {t1:.0f} s", f"{min(100.0 * self.first.probability, 99.0):.0f} % sure"]
-        drift_m = self.first.drift_m
-        if drift_m is not None and drift_m > ASTRAY_M:
-            phrases.append(f"meanwhile the autopilot's own estimate went {drift_m:.1f} m astray")
+        astray = self.first.astray
+        if astray is not None and astray.is_large:
+            phrases.append(f"meanwhile {astray.words}")
         return f"{self.first.sentence} ({'; '.join(phrases)})"
 
     def cure_text(self, dialect: str = "") -> str:
@@ -190,10 +195,15 @@ def _tried(case: Case, checked: list[Checked]) -> list[Checked]:
 
 
 def _rank(one: Checked) -> float:
-    """The surer first; of those that are as sure, the one that explains more and began earlier."""
+    """The surer first; of those that are as sure, the one that explains more and began earlier.
+
+    What cannot be tried counts as if it explained all: that there is no replay of it is not held against it.
+    """
     explained = one.trial.explained if one.trial is not None and one.trial.explained is not None else 0.0
+    explained = 1.0 if one.hypothesis.repair is None else explained
     return (
-        math.log(min(max(one.sign.strength, 1e-3), AS_SURE_AS_ANY))
+        NAMED_LAST * one.hypothesis.named_last
+        + math.log(min(max(one.sign.strength, 1e-3), AS_SURE_AS_ANY))
         + 0.3 * max(explained, 0.0)
         - 1e-4 * one.sign.window_s[0]
     )
@@ -209,10 +219,11 @@ def _finding(case: Case, one: Checked, dialect: str) -> Finding:
         one.sign.window_s,
         one.probability,
         trial.explained,
-        trial.drift_m,
+        trial.astray,
         one.sign.figures,
         one.sign.pictures,
         row.cure(case, one.sign, dialect),
+        difference(case, row.name) if one.trial is not None else "",
     )
 
 

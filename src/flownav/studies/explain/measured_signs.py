@@ -3,6 +3,9 @@
 The first needs the sensor's own gyro and no reference; the second a position reference, or GPS.
 """
 
+import numpy as np
+
+from flownav.lab.identification.flight_identification import Measured
 from flownav.lab.identification.quantities import Interval
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.flow_signs import NO_FLOW, NO_RATES, gains, gyros_picture
@@ -42,13 +45,30 @@ def offset(case: Case) -> Found:
     """A drift fixed in the body's axes: what the flow reads where nothing moves."""
     if case.flow is None:
         return NO_FLOW
-    measured = case.measured
-    if measured is None or measured.offset is None:
+    known = [one for one in (case.measured, case.measured_by_gps) if one is not None and one.offset is not None]
+    if not known:
         return Lack("no reference and no GPS that moves enough to hold the flow's offset against")
-    x, y = measured.offset
-    nearest = [max(abs(axis.value) - 0.5 * (axis.high - axis.low), 0.0) for axis in (x, y)]
-    figures: dict[str, float | str] = {"x": x.value, "y": y.value, "reference": measured.flown.reference_name}
-    return Sign(max(nearest) / OFFSET_RAD_S, case.flight_s, figures, (offset_picture(case, x.value, y.value),))
+    least = min(known, key=_surely_off) if _contradict(known) else known[0]
+    assert least.offset is not None
+    x, y = least.offset
+    figures: dict[str, float | str] = {"x": x.value, "y": y.value, "reference": least.flown.reference_name}
+    picture = offset_picture(case, x.value, y.value)
+    return Sign(_surely_off(least) / OFFSET_RAD_S, case.flight_s, figures, (picture,))
+
+
+def _contradict(known: list[Measured]) -> bool:
+    """Whether a reference and GPS state offsets beyond both their intervals; the one nearer to 0 counts then."""
+    offsets = [one.offset for one in known if one.offset is not None]
+    return len(offsets) == 2 and any(
+        abs(mine.value - theirs.value) > 0.5 * float(np.hypot(mine.high - mine.low, theirs.high - theirs.low))
+        for mine, theirs in zip(*offsets, strict=True)
+    )
+
+
+def _surely_off(one: Measured) -> float:
+    """The larger offset of the two axes, by the nearer end of its interval [rad/s]."""
+    assert one.offset is not None
+    return max(max(abs(axis.value) - 0.5 * (axis.high - axis.low), 0.0) for axis in one.offset)
 
 
 def offset_picture(case: Case, x: float, y: float) -> Picture:

@@ -10,9 +10,10 @@ from flownav.report.chart import Stack
 from flownav.report.html import linked_with, template
 from flownav.report.panels import Panel, Section, listed
 from flownav.report.series import Moment
+from flownav.studies.explain.astray import Astray
+from flownav.studies.explain.hypothesis import words
 from flownav.studies.explain.judge import Checked, Explanation, Finding
 from flownav.studies.explain.sign import Picture, Window
-from flownav.studies.explain.table import words
 
 HEADINGS = ("Cause", "Sign", "Probability", "Explained", "Seconds", "Tried")
 DASH = "\N{EN DASH}"
@@ -45,7 +46,8 @@ def _cause(one: Finding) -> dict[str, Any]:
         "t1_s": one.window_s[1],
         "probability": one.probability,
         "explained": one.explained,
-        "drift_m": one.drift_m,
+        **_astray(one.astray),
+        "beside_replay": one.beside_replay or None,
         "figures": dict(one.figures),
         "cure": {
             "parameters": [{"name": p.name, "value": p.value, "reason": p.reason} for p in one.cure.settings],
@@ -67,8 +69,15 @@ def _checked(one: Checked) -> dict[str, Any]:
         "consequence_of": one.consequence_of or None,
         "tried": None if trial is None else trial.words,
         "explained": None if trial is None else trial.explained,
-        "drift_m": None if trial is None else trial.drift_m,
+        **_astray(None if trial is None else trial.astray),
     }
+
+
+def _astray(found: Astray | None) -> dict[str, Any]:
+    """How far the autopilot's own estimate was off meanwhile, and against what."""
+    if found is None:
+        return {"drift_m": None, "drift_max_m": None, "drift_against": None}
+    return {"drift_m": found.rms_m, "drift_max_m": found.most_m, "drift_against": found.against}
 
 
 def inside(title: str) -> str:

@@ -6,7 +6,7 @@ from flownav.core.measurement import Array, Sensor
 from flownav.studies.explain.case import Case, FlowSeen
 from flownav.studies.explain.flow_signs import NO_FLOW, NO_RATES, found_lag
 from flownav.studies.explain.sign import Found, Lack, Picture, Sign, Trace, Window, nothing
-from flownav.studies.explain.signals import Flags, at, running_median, spread, stretches
+from flownav.studies.explain.signals import Flags, at, running_mean, running_median, spread, stretches
 
 BIN_S = 1.0
 BLIND_S, SILENT_S = 4.0, 1.2
@@ -15,6 +15,7 @@ ZERO_SHARE, EXPECTED_RAD_S = 0.25, 0.06
 LOW_M, NOISE_RATIO, LEAST_LOW_S = 0.45, 3.0, 1.5
 LOWS_M = (0.15, 0.2, 0.25, 0.3, 0.35, 0.4, LOW_M)  # where the blur may end
 
+MOTION_SHARE = 0.5  # chosen: a PMW3901 jumps by a third to half of the flow, ten indoor flights
 NOISY_RAD_S, NOISE_S, NOISE_WINDOW_S, LEAST_NOISY = 0.3, 3.0, 2.0, 30  # six times what a good sensor has
 FUSED_EVERY_S = 0.05  # filters average readings that come faster
 
@@ -152,6 +153,8 @@ def noise(case: Case) -> Found:
     limit = max(NOISY_RAD_S, noise_stated or 0.0)
     noisy = np.flatnonzero(jumps > 0.6 * max(level, limit))
     size = float(np.median(jumps[noisy])) if len(noisy) >= rows else level
+    if len(noisy):  # counters jump by a share of what they count
+        limit = max(limit, MOTION_SHARE * float(np.median(_motion(seen, jumps / averaged, count)[noisy])))
     window = (float(t_s[noisy[0]]), float(t_s[noisy[-1]])) if len(noisy) else case.flight_s
     figures: dict[str, float | str] = {
         "noise_rad_s": size, "usual_rad_s": float(np.median(jumps)),
@@ -161,6 +164,12 @@ def noise(case: Case) -> Found:
         Trace("flow", "flow x", t_s, seen[:, 0], dots=True), Trace("gps", "flow y", t_s, seen[:, 1], dots=True),
     ), "A vehicle's motion makes lines of the dots.")  # fmt: skip
     return Sign(size / limit, window, figures, (picture,))
+
+
+def _motion(seen: Array, jumps: Array, count: int) -> Array:
+    """The flow (n,) about the axis that has more of it, rms over `count` rows, without its jumps."""
+    power = running_mean(seen**2, count).max(axis=1)
+    return np.asarray(np.sqrt(np.maximum(power - jumps**2, 0.0)))
 
 
 def _news(values: Array) -> Flags:

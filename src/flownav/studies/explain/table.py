@@ -4,13 +4,8 @@ words.
 explains: what else such a log shows, and is no cause of its own then.
 """
 
-import tomllib
-from collections.abc import Callable
-from functools import lru_cache
-from typing import NamedTuple
-
 from flownav.core.measurement import Sensor
-from flownav.core.parameter_files import shipped
+from flownav.replays.prepare import GPS
 from flownav.studies.explain import (
     body_cures,
     body_signs,
@@ -23,39 +18,11 @@ from flownav.studies.explain import (
     place_signs,
     setting_signs,
     sight_signs,
+    slip_signs,
     trials,
 )
-from flownav.studies.explain.case import Case
-from flownav.studies.explain.cure import Curing, by_hand_only
-from flownav.studies.explain.sign import Found
-from flownav.studies.explain.trials import Repairing
-
-WORDS_FILE = "causes.toml"
-
-
-class Hypothesis(NamedTuple):
-    """name; what it needs of the log; the parameters that it reads; the look, the trial and the cure."""
-
-    name: str
-    needs: str
-    parameters: tuple[str, ...]
-    look: Callable[[Case], Found]
-    repair: Repairing | None
-    cure: Curing
-    explains: tuple[str, ...] = ()
-
-    @property
-    def words(self) -> dict[str, str]:
-        """title, sentence, looks, why, prevent."""
-        return words()[self.name]
-
-
-@lru_cache(maxsize=1)
-def words() -> dict[str, dict[str, str]]:
-    """The words of each cause, by its name."""
-    content = tomllib.loads(shipped(WORDS_FILE).read_text(encoding="utf-8"))
-    return {name: group for name, group in content.items() if isinstance(group, dict)}
-
+from flownav.studies.explain.cure import by_hand_only
+from flownav.studies.explain.hypothesis import Hypothesis
 
 FLOW_DELAYS = ("EKF2_OF_DELAY", "EK3_FLOW_DELAY")
 SOURCES = (
@@ -283,7 +250,7 @@ HYPOTHESES = (
         "GPS with velocity",
         ("EKF2_GPS_P_GATE", "EK3_POS_I_GATE", "EK3_GLITCH_RAD"),
         place_signs.glitch,
-        trials.without("GPS withheld meanwhile", *trials.GPS),
+        trials.without("GPS withheld meanwhile", *GPS),
         place_cures.glitch,
         ("gps_lag",),
     ),
@@ -321,6 +288,17 @@ HYPOTHESES = (
         body_signs.landed,
         trials.without("the landing flag withheld", Sensor.LANDED),
         body_cures.landing,
+    ),
+    Hypothesis(
+        "slid_on_ground",
+        "a position reference",
+        (),
+        slip_signs.slid,
+        None,
+        by_hand_only(
+            "Take off from ground that grips, and lift off as soon as the rotors run: the origin is right then."
+        ),
+        named_last=True,
     ),
 )
 BY_NAME = {one.name: one for one in HYPOTHESES}

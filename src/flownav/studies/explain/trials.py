@@ -13,14 +13,14 @@ import numpy as np
 from flownav.core.frames import rotation_from_quaternion
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.logs.log import attitude_at
-from flownav.replays.prepare import ReplayOptions
+from flownav.replays.prepare import GPS, ReplayOptions
 from flownav.replays.session import Replay
+from flownav.studies.explain.astray import Astray, astray
 from flownav.studies.explain.autopilot_settings import RANGE
 from flownav.studies.explain.case import Case
 from flownav.studies.explain.sign import Sign
 from flownav.studies.explain.signals import Flags, at, running_mean
 
-FLOW, GPS = (Sensor.FLOW_RATE,), (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
 LARGEST_SQUARE = 25.0
 LEAST_EXCESS = 0.15
 LEAST_TESTED = 20
@@ -40,13 +40,13 @@ class Repair(NamedTuple):
 
 
 class Trial(NamedTuple):
-    """explained: share of the innovations' excess, None where there is none to explain. drift_m: how far the
-    autopilot's own estimate went astray from the repaired path within the sign's window; None without one.
+    """explained: share of the innovations' excess, None where there is none to explain. astray: how far the
+    autopilot's own estimate was off within the sign's window; None where nothing shows it.
     """
 
     words: str
     explained: float | None
-    drift_m: float | None
+    astray: Astray | None
 
 
 Repairing = Callable[[Case, Sign], Repair]
@@ -172,7 +172,11 @@ def tried(case: Case, sign: Sign, repairing: Repairing | None) -> Trial:
     log's own heading, the height of its source, GPS as it comes.
     """
     if repairing is None:
-        return Trial("nothing to replay: parameters and log decide", None, drift(case, case.base, sign))
+        return Trial(
+            "nothing to replay: parameters and log decide",
+            None,
+            astray(case, case.base, sign.window_s, gps_is_blamed=False),
+        )
     repair = repairing(case, sign)
     run = case.replayed(repair.streams, repair.options)
     if run is None:
@@ -181,7 +185,8 @@ def tried(case: Case, sign: Sign, repairing: Repairing | None) -> Trial:
     attitude = run.attitude if Sensor.MAG in repair.withheld else case.attitude
     after = mismatch(case, repair.streams, run, attitude, repair.options)
     share = None if before.excess < LEAST_EXCESS else float(np.clip(1.0 - after.excess / before.excess, -1.0, 1.0))
-    return Trial(repair.words, share, drift(case, run, sign))
+    gps_is_blamed = bool(set(GPS) & set(repair.withheld)) or repair.options != case.options
+    return Trial(repair.words, share, astray(case, run, sign.window_s, gps_is_blamed=gps_is_blamed))
 
 
 def mismatch(case: Case, streams: Streams, run: Replay, attitude: Stream | None, options: ReplayOptions) -> Mismatch:
@@ -249,18 +254,3 @@ def _of_place(case: Case, streams: Streams, run: Replay, options: ReplayOptions)
     )
     level = np.hypot(*(apart - np.median(apart, axis=0)).T) if len(apart) else np.zeros(0)
     return max(_capped(level, PLACE_FLOOR_M), _capped(np.hypot(*np.nan_to_num(moved - other).T), SPEED_FLOOR_M_S))
-
-
-def drift(case: Case, run: Replay | None, sign: Sign) -> float | None:
-    """How far the autopilot's own path and this one went apart while the sign lasted [m], level."""
-    if case.own is None or run is None:
-        return None
-    t_s = case.own.t_s
-    inside = (t_s >= max(sign.window_s[0], case.flight_s[0])) & (t_s <= min(sign.window_s[1], case.flight_s[1]))
-    if inside.sum() < 5:
-        return None
-    ours = np.column_stack(
-        [np.interp(t_s[inside], run.estimate_rows.t_s, run.estimate_rows.pos_ned_m[:, axis]) for axis in range(2)]
-    )
-    apart = case.own.pos_ned_m[inside, :2] - ours
-    return float(np.hypot(*(apart - apart[0]).T).max())

@@ -47,7 +47,7 @@ from flownav.navigation.motion_records import (
     SteadyForce,
 )
 from flownav.navigation.now import NowState, coasted, moved_on
-from flownav.navigation.place import judge_pad
+from flownav.navigation.pad import judge_pad
 from flownav.navigation.protection import levels
 from flownav.navigation.reasons import FUSED
 from flownav.navigation.records import (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from flownav.core.measurement import Sensor
@@ -16,7 +17,8 @@ from flownav.navigation.gps import UNKNOWN_PAD_M, AlongAxis, judge_fate
 from flownav.navigation.kernel_settings import NO_HEADING, Equipment
 from flownav.navigation.motion_records import CourseMemory, ImuMemory, PushMemory
 from flownav.navigation.offers import compare_level, note_aid, note_aid_age, note_height
-from flownav.navigation.place import (
+from flownav.navigation.pad import (
+    FIXES_THAT_FIND,
     LEFT,
     MANY_STRAYS,
     NEVER_STOOD,
@@ -26,9 +28,9 @@ from flownav.navigation.place import (
     count_refusals,
     find_pad,
     judge_sight,
-    stand_on_pad,
 )
-from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT
+from flownav.navigation.place import stand_on_pad
+from flownav.navigation.reasons import DATUM, FUSED, INNOVATION_GATE, SILENT
 from flownav.navigation.records import (
     AidMemory,
     FixMemory,
@@ -176,43 +178,92 @@ def test_what_is_not_aided_reckons_and_is_then_invalid():
 
 
 # -- the pad -------------------------------------------------------------------------------------------------
-def test_a_pad_that_a_camera_sees_first_is_found_where_it_is():
-    s = TOLD.place._replace(pad_forward_m=0.5, pad_right_m=0.0, pad_below_m=0.0)
-    found = find_pad.law(reading(0.0, 0.0, 4.0), RUNS, BESIDE, QUARTER, PadMemory(LEFT), s=s)
-    assert found.pad.known == SEEN
-    assert placed(found.place) == [
+LENS = TOLD.place._replace(pad_forward_m=0.5, pad_right_m=0.0, pad_below_m=0.0)
+
+
+def looked(fixes, m):
+    """What `find_pad` makes of these fixes (forward, right, distance), one after the other."""
+    found = []
+    for fix in fixes:
+        found.append(find_pad.law(reading(*fix), RUNS, BESIDE, QUARTER, m, s=LENS))
+        m = found[-1].pad
+    return found
+
+
+def test_a_pad_that_fixes_see_at_one_place_is_found_there_by_the_last_of_them():
+    fixes = [(0.0, 0.0, 4.0 + 0.01 * k) for k in range(int(FIXES_THAT_FIND) + 1)]
+    *before, last, after = looked(fixes, PadMemory(LEFT))
+    assert [(one.pad.known, placed(one.place), one.found.kind) for one in before] == [(LEFT, [], -1)] * len(before)
+    assert last.pad.known == SEEN
+    away = 0.01 * (FIXES_THAT_FIND - 1)
+    assert placed(last.place) == [
         (PAD, pytest.approx(1.0)),
         (PAD + 1, pytest.approx(2.5)),
-        (PAD + 2, pytest.approx(1.0)),
+        (PAD + 2, pytest.approx(1.0 + away)),
     ]
-    assert found.found == (PAD_FOUND, pytest.approx(math.sqrt(1.0 + 6.25 + 1.0)))
-    for other in (PadMemory(SEEN), PadMemory(0.0)):
-        again = find_pad.law(reading(0.0, 0.0, 4.0 * other.known), RUNS, BESIDE, QUARTER, other, s=s)
-        assert (again.pad, placed(again.place), again.found.kind) == (other, [], -1)
+    assert last.found == (PAD_FOUND, pytest.approx(math.sqrt(1.0 + 6.25 + (1.0 + away) ** 2)))
+    assert (after.pad.known, placed(after.place), after.found.kind) == (SEEN, [], -1)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_fixes_that_see_something_elsewhere_each_time_find_no_pad(axis):
+    """From 4 m places agree within 0.6 m: 0.55 m apart they do, 0.65 m apart they do not."""
+    for apart_m, known in ((0.55, SEEN), (0.65, LEFT)):
+        fixes = np.tile([0.0, 0.0, 4.0], (8, 1))
+        fixes[1::2, axis] += apart_m if axis == 2 else apart_m / 4.0
+        if axis < 2:
+            fixes[1::2, 2] = 4.0 * math.sqrt(1.0 + (apart_m / 4.0) ** 2)
+        assert looked(fixes, PadMemory(LEFT))[-1].pad.known == known
+
+
+def test_a_fix_that_cannot_be_used_neither_agrees_nor_interrupts():
+    before = looked([(0.0, 0.0, 4.0)], PadMemory(LEFT))[-1].pad
+    assert looked([(0.0, 0.0, 0.0)], before)[-1].pad == before
+
+
+def test_a_fix_corrects_nothing_before_the_pad_is_found():
+    seen = (reading(0.1, -0.2, 4.0), RUNS, VelocityNed(0.0, 0.0, 0.0), ImuMemory(), LevelMemory())
+    for pad, expected in ((PadMemory(LEFT), DATUM), (PadMemory(0.0), DATUM), (PadMemory(SEEN), FUSED)):
+        judged = judge_sight.law(*seen, pad, component=1, alone=True, s=TOLD.place)
+        assert judged.offer.reason == expected
 
 
 def test_the_law_of_a_pad_fix_reads_all_of_it_and_what_one_component_refuses_none_is_fused_of():
     seen = (reading(0.1, -0.2, 4.0), RUNS, VelocityNed(0.0, 0.0, 0.0), ImuMemory())
-    judged = judge_sight.law(*seen, LevelMemory(0.9), component=1, alone=False, s=TOLD.place)
+    pad = PadMemory(SEEN)
+    judged = judge_sight.law(*seen, LevelMemory(0.9), pad, component=1, alone=False, s=TOLD.place)
     assert (judged.offer.measured, judged.offer.reason, judged.sight) == (-0.2, FUSED, (0.1, -0.2, 4.0))
     for component in range(3):
-        apart = judge_sight.law(*seen, LevelMemory(1.1), component=component, alone=False, s=TOLD.place)
-        alone = judge_sight.law(*seen, LevelMemory(1.1), component=component, alone=True, s=TOLD.place)
+        apart = judge_sight.law(*seen, LevelMemory(1.1), pad, component=component, alone=False, s=TOLD.place)
+        alone = judge_sight.law(*seen, LevelMemory(1.1), pad, component=component, alone=True, s=TOLD.place)
         assert (apart.offer.reason, alone.offer.reason) == (INNOVATION_GATE, FUSED)
 
 
-def test_a_pad_that_is_seen_elsewhere_again_and_again_is_not_where_it_was_seen_first():
-    m = PadMemory(SEEN)
-    for _ in range(int(MANY_STRAYS)):
-        assert m.known == SEEN
-        m = count_refusals.law(Fate(INNOVATION_GATE), m)
-    assert m == PadMemory(LEFT, 0.0)
+def refused(fixes, m):
+    """The memory after these fixes, each refused by the filter."""
+    for fix in fixes:
+        m = count_refusals.law(Fate(INNOVATION_GATE), looked([fix], m)[0].pad)
+    return m
+
+
+def test_a_pad_that_is_seen_at_one_other_place_again_and_again_is_not_where_it_was_seen_first():
+    elsewhere = [(0.5, 0.0, 4.0)] * int(MANY_STRAYS)
+    assert refused(elsewhere[:-1], PadMemory(SEEN)).known == SEEN
+    m = refused(elsewhere, PadMemory(SEEN))
+    assert m.known == LEFT
+    assert looked(elsewhere[:1], m)[0].pad.known == SEEN  # the next of them finds it there
+
+
+def test_false_fixes_all_over_the_view_move_no_pad():
+    rng = np.random.default_rng(8)
+    level = np.column_stack([1.7 * np.cos(2.4 * np.arange(40)), np.sin(2.4 * np.arange(40)), rng.uniform(3.9, 4.1, 40)])
+    assert refused(level, PadMemory(SEEN)).known == SEEN
 
 
 def test_a_fix_that_is_fused_ends_the_count_and_one_that_is_not_there_does_not():
     m = PadMemory(SEEN, 3.0)
-    assert count_refusals.law(Fate(FUSED), m).refusals == 0.0
-    assert count_refusals.law(Fate(SILENT), m).refusals == 3.0
+    assert count_refusals.law(Fate(FUSED), m).agreeing == 0.0
+    assert count_refusals.law(Fate(SILENT), m).agreeing == 3.0
 
 
 @pytest.mark.parametrize(("known", "off_m", "landed", "after", "moves", "stands"), [

@@ -22,7 +22,8 @@ from flownav.navigation.inertial import motion_between, motion_of, sound
 from flownav.navigation.kernel_settings import NO_HEADING as HEADLESS
 from flownav.navigation.kernel_settings import Equipment
 from flownav.navigation.motion_records import ImuMemory, SteadyForce
-from flownav.navigation.place import judge_pad, judge_pose, late_variance
+from flownav.navigation.pad import judge_pad, late_variance
+from flownav.navigation.place import judge_pose
 from flownav.navigation.reasons import (
     BEFORE_START,
     FUSED,

@@ -62,13 +62,15 @@ def flight():
     return assemble(load_scenario("approach")).flight
 
 
-def test_each_lane_has_the_wind_of_its_own_height_over_its_own_ground(flight):
+def test_each_lane_has_the_wind_of_its_own_rotor_over_its_own_ground(flight):
     wind = WindSettings(speed_20ft_m_s=6.0, gusts=False).parameters()
     grounds = [GroundSettings(slope_deg=0.5 * lane).parameters() for lane in range(COUNT)]
     truths = [believed(flight)._replace(wind=wind, ground=ground) for ground in grounds]
-    found = surrounded(flight, truths, [at(1.0, north=2.0)] * COUNT)
+    rolls = [0.1 * lane for lane in range(COUNT)]
+    found = surrounded(flight, truths, [at(1.0, north=2.0, roll=roll) for roll in rolls])
     for lane, one in enumerate(found):
-        height = 1.0 - 2.0 * math.tan(math.radians(0.5 * lane))
+        hub = 1.0 + flight.vehicle.hub_above_cg_m * math.cos(rolls[lane])
+        height = hub - 2.0 * math.tan(math.radians(0.5 * lane))
         assert -one.wind_n_m_s == pytest.approx(6.0 * math.log(height / 0.04572) / math.log(6.096 / 0.04572))
         assert one.slope_n == pytest.approx(math.tan(math.radians(0.5 * lane)))
         assert one.cosine == pytest.approx(math.cos(math.radians(0.5 * lane)))

@@ -28,7 +28,7 @@ from flownav.navigation.memory import (
     load_suspicion,
 )
 from flownav.navigation.now import NowRow
-from flownav.navigation.place import SEEN
+from flownav.navigation.pad import SEEN
 from flownav.navigation.progress import LONGEST_AHEAD_S
 
 UNFUSED = "unfused"  # a reason that the session finds (horizon.Serving)

@@ -240,13 +240,17 @@ class GpsMemory(NamedTuple):
 
 
 class PadMemory(NamedTuple):
-    """known: 0 where the pad is not, or how it is: NEVER_STOOD, STOOD_ON, LEFT, SEEN of `place`; refusals: of fixes in
-    a row; aloft_s: since when a vehicle that stood nowhere is reported to fly.
+    """known: 0 where the pad is not, or how it is: NEVER_STOOD, STOOD_ON, LEFT, SEEN of `place`; agreeing: fixes in a
+    row that see something at one place, which is not where the pad is known to be; aloft_s: since when a vehicle that
+    stood nowhere is reported to fly; last_: where the latest fix saw something, local NED [m].
     """
 
     known: float = 0.0
-    refusals: float = 0.0
+    agreeing: float = 0.0
     aloft_s: float = inf
+    last_n_m: float = inf
+    last_e_m: float = inf
+    last_d_m: float = inf
 
 
 class RejectionMemory(NamedTuple):

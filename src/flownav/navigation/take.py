@@ -48,7 +48,8 @@ from flownav.navigation.packed import (
     load_imu_settings,
     load_place_settings,
 )
-from flownav.navigation.place import take_landed, take_pad, take_pose
+from flownav.navigation.pad import take_pad
+from flownav.navigation.place import take_landed, take_pose
 from flownav.navigation.protection import set_levels
 from flownav.navigation.spikes import drop_spikes
 from flownav.navigation.start import runs, try_start

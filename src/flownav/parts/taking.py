@@ -17,7 +17,7 @@ from flownav.estimation.covariance import place
 from flownav.estimation.gating import Reason
 from flownav.estimation.states import ACCEL_BIAS, GROUND, GYRO_BIAS, PAD, POSITION, QUATERNION, STATE, VELOCITY
 from flownav.navigation.memory import CLOCK, GROUND_SEEN, PAD_KNOWN, READING, START
-from flownav.navigation.place import SEEN
+from flownav.navigation.pad import SEEN
 from flownav.navigation.rows import EXTRA_STATES, EstimateRow, InnovationRow
 from flownav.navigation.take import UNIT_SIGNATURE
 from flownav.navigation.tape import ESTIMATE_PERIOD_S, ESTIMATES, OFFERED_ROWS, Tape

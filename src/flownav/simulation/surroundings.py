@@ -93,12 +93,13 @@ class Air(NamedTuple):
 
 @layout.PLANT.on_lanes(calls.blow)
 def blow(
-    state: HelicopterState, ground: Ground, gusts: WindState, normals: WindNormals, wind: WindParameters, here: Around,
-    *, now: Runs,
+    state: HelicopterState, ground: Ground, gusts: WindState, normals: WindNormals, wind: WindParameters,
+    p: RecirculationParameters, here: Around, *, now: Runs,
 ) -> Air:  # fmt: skip
-    """The wind at the vehicle's height, and what of the vehicle runs."""
-    height = -state.pos_d - ground_height(state.pos_n, state.pos_e, ground)
-    after, air = step_wind(gusts, height, normals, wind)
+    """The wind at the height of the rotor, which feels the most of it, and what of the vehicle runs."""
+    rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
+    hub = p.hub_above_cg_m * rotation[8] - state.pos_d - ground_height(state.pos_n, state.pos_e, ground)
+    after, air = step_wind(gusts, hub, normals, wind)
     around = _running(here, engine=now.engine, motor_out=now.motor_out, tail_stuck=now.tail_stuck)
     return Air(after, in_air(around, air))
 

@@ -9,8 +9,8 @@ With h in feet and W20 the wind speed at 20 ft:
     H_u(s) = sigma_u sqrt(2 T_u/pi) / (1 + T_u s)
     H_w(s) = sigma_w sqrt(T_w/pi) (1 + sqrt(3) T_w s) / (1 + T_w s)^2,   H_v alike,   T = L/V
 
-Both come down to nothing at the ground: the steady speed is that of the vehicle's own height, by the logarithmic law
-down to its roughness length z0, and below the reference height the gusts shrink as it does, so that the turbulence's
+Both come down to nothing at the ground: the steady speed is that of the rotor's height, by the logarithmic law down to
+its roughness length z0, and below the reference height the gusts shrink as it does, so that the turbulence's
 intensity sigma_u/V stays (the specification's sigma does not know the ground). z0 is a setting; the specification's
 is 0.15 ft. Two simplifications, stated: the gusts' scales are those of the reference height (near the ground L_w would
 shrink with h, and quicker gusts push less), and the frozen gust field is carried past the vehicle at the reference

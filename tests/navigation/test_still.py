@@ -18,6 +18,7 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.still import (
     GYRO_FLOOR_RAD_S,
     HOLD_S,
+    REST_RAD,
     SETTLE_RAD,
     SLIDING_SIGMA_M_S,
     SLIP_RAD,
@@ -236,11 +237,10 @@ def test_a_velocity_that_standing_contradicts_is_freed_and_the_accelerometer_tha
     assert in_the_air.velocity.variance == 0.0
 
 
-@pytest.mark.parametrize("axis", [0, 1, 2])
-def test_windows_of_a_stand_add_up_to_one_bound_on_what_it_turned(axis):
-    bound = SLIP_RAD if axis == 2 else SETTLE_RAD
+@pytest.mark.parametrize("bound", [SLIP_RAD, SETTLE_RAD, REST_RAD])
+def test_windows_of_a_stand_add_up_to_one_bound_on_what_it_turned(bound):
     for count in (1, 4, 60):
-        told = sum(1.0 / stand_turning(float(n), axis) for n in range(1, count + 1))
+        told = sum(1.0 / stand_turning(float(n), bound) for n in range(1, count + 1))
         assert 1.0 / math.sqrt(told) == pytest.approx(bound / (count * WINDOW_S))
 
 
@@ -255,7 +255,16 @@ def test_a_bias_is_opened_by_a_real_rest_only():
     assert at_rest.opened.variance == pytest.approx((BIAS[2] - wrong.rad_s) ** 2)
     assert shaken.opened.variance == 0.0
     assert taught(RESTS, AxisBias(BIAS[2], 1e-6)).opened.variance == 0.0
-    assert at_rest.offer.variance < 2.0 * GYRO_FLOOR_RAD_S**2 < shaken.offer.variance
+    assert at_rest.offer.variance < 8.0 * GYRO_FLOOR_RAD_S**2 + stand_turning(4.0, REST_RAD) < shaken.offer.variance
+
+
+def test_one_quiet_window_is_not_taken_for_a_bias_and_ten_seconds_of_them_are():
+    """A rotor that spools up turns a helicopter on its skids by 0.2 deg/s, as quietly as one at rest: heli_sitl."""
+    assert taught(RESTS, AxisBias(0.0, 1e-4), windows=1.0).offer.variance > math.radians(0.2) ** 2
+    told = sum(1.0 / taught(RESTS, AxisBias(0.0, 1e-4), windows=float(n)).offer.variance for n in range(1, 21))
+    assert 1.0 / math.sqrt(told) < math.radians(0.02)
+    known = AxisBias(BIAS[2] + math.radians(0.2), math.radians(0.13) ** 2)
+    assert taught(RESTS, known, windows=1.0).opened.variance == 0.0
 
 
 # -- what is usual -------------------------------------------------------------------------------------------------

@@ -55,6 +55,9 @@ GYRO_FLOOR_RAD_S = 3e-4  # chosen: 6 s of rest leave 0.0002 rad/s of bias (navig
 # What a vehicle whose motors run turns over the whole of a stand: about down it slips as the rotors spin up (0.4 to 2.8
 # deg in logs of small drones), and it settles on what carries it.
 SLIP_RAD, SETTLE_RAD = 0.05, 0.02
+# What one turns over the whole of a quiet stand: a helicopter whose rotor spools up turns by 0.2 deg/s on its skids, as
+# quietly as one at rest (heli_sitl), and one such window is no bias of 0.2 deg/s
+REST_RAD = 0.002
 BELIEVED_SIGMAS = 2.0  # a bias that rest contradicts by more is opened: chosen, half a usual gate
 
 
@@ -153,16 +156,14 @@ def offer_rest(
 
 
 @equation
-def stand_turning(windows: float, axis: int) -> float:
+def stand_turning(windows: float, bound_rad: float) -> float:
     """The variance of a window's mean turning about its gyro's bias [(rad/s)^2], of a vehicle that has stood for that
-    number of windows with its motors on: what it turns over the whole stand is bounded, not what it turns in each
-    window.
+    number of windows: what it turns over the whole stand is bounded, not what it turns in each window.
 
     A stand of n windows determines the rate to within the bound over its time T = n WINDOW_S, which is an information
     of T^2 / bound^2; a window's is what T^2 grew by.
     """
-    bound = SLIP_RAD if axis == 2 else SETTLE_RAD
-    rate = bound / WINDOW_S
+    rate = bound_rad / WINDOW_S
     return rate * rate / (2.0 * windows - 1.0)
 
 
@@ -183,7 +184,8 @@ def offer_bias(
     """
     mean, square = turning_of(gyro, axis)
     resting = m.does == RESTS
-    least = GYRO_FLOOR_RAD_S * GYRO_FLOOR_RAD_S if resting else stand_turning(m.windows, axis)
+    turned_rad = REST_RAD if resting else (SLIP_RAD if axis == 2 else SETTLE_RAD)
+    least = GYRO_FLOOR_RAD_S * GYRO_FLOOR_RAD_S + stand_turning(m.windows, turned_rad)
     teaches = start.started > 0.0 and (resting or touches(m, seen))
     variance = square / larger(gyro.readings, 1.0) + least
     off = squared(mean - bias.rad_s)

@@ -1,4 +1,4 @@
-"""What `flownav replay` says of the sensor that a cause blames stands beside the cause where the two differ."""
+"""The verdict of `flownav replay` on the sensor that a cause blames stands beside the cause where the two differ."""
 
 from __future__ import annotations
 

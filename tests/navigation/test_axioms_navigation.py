@@ -64,7 +64,7 @@ from flownav.navigation.records import (
 from flownav.navigation.rings import Given, Rings, numbers_of
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.spikes import BURST_S, LONE_SHARE, MOST_DOUBT_M_S, doubt_of
-from flownav.navigation.still import GYRO_FLOOR_RAD_S, REST_RAD, offer_bias, stand_turning
+from flownav.navigation.still import GYRO_FLOOR_RAD_S, offer_bias
 from flownav.navigation.suspicion import HELD_S, judge_suspicion
 from flownav.navigation.tape import empty_tape
 from flownav.navigation.verdicts import AxisBias, Force, Height
@@ -386,8 +386,7 @@ def test_a_mean_of_more_readings_is_surer():
             axis=0,
         ).offer
         assert offers[count].measured == pytest.approx(0.01, rel=1e-9)
-        least = GYRO_FLOOR_RAD_S**2 + stand_turning(3.0, REST_RAD)
-        assert offers[count].variance == pytest.approx(0.005**2 / count + least, rel=1e-9)
+        assert offers[count].variance == pytest.approx(0.005**2 / count + GYRO_FLOOR_RAD_S**2, rel=1e-9)
         assert offers[count].reason == FUSED
     assert offers[100].variance < offers[25].variance
     shaken = offer_bias.law(

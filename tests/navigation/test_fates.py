@@ -182,7 +182,7 @@ LENS = TOLD.place._replace(pad_forward_m=0.5, pad_right_m=0.0, pad_below_m=0.0)
 
 
 def looked(fixes, m):
-    """What `find_pad` makes of these fixes (forward, right, distance), one after the other."""
+    """The results of `find_pad` of these fixes (forward, right, distance), one after the other."""
     found = []
     for fix in fixes:
         found.append(find_pad.law(reading(*fix), RUNS, BESIDE, QUARTER, m, s=LENS))

@@ -22,8 +22,8 @@ from flownav.navigation.tape import PAD_FOUND, Output
 from flownav.navigation.verdicts import UNKNOWN_M, Event, Fate, Offer, Reset, on_lanes
 
 LEAST_PAD_DISTANCE_M = 0.05  # chosen: no camera on board is so near its pad; halved it fails test_judges
-# Fixes in a row that agree on one place: chosen. So many find the pad, for a single one may be of something else, and
-# with one frame in twenty false most flights landed metres beside their pad; and so many refused ones show that it is
+# Fixes in a row that agree on one place: chosen. Three find the pad, for a single one may be of something else, and
+# with one frame in twenty false most flights landed metres beside their pad; four refused ones show that it is
 # elsewhere (test_a_pad_first_seen_where_there_is_none_is_found_where_it_is).
 FIXES_THAT_FIND, MANY_STRAYS = 3.0, 4.0
 # two fixes agree within so much and this share of the distance: chosen, not measured; 0.1 s of motion and the noise

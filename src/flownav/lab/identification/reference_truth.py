@@ -147,5 +147,5 @@ def _fitted(flow: Array, reference: Array) -> tuple[complex, complex, float]:
 def _solved(flow: Array, *columns: Array) -> tuple[Array, float]:
     """The complex factors of columns (m,) that make the flow, by least squares; and the residual's power."""
     design = np.column_stack(columns)
-    factors = np.linalg.lstsq(design, flow, rcond=None)[0]
+    factors = np.asarray(np.linalg.lstsq(design, flow, rcond=None)[0])
     return factors, float(np.sum(np.abs(flow - design @ factors) ** 2))

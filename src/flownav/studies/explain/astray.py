@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flownav.core.measurement import Array
 from flownav.core.record import POSITION_NED, Table
@@ -74,7 +75,7 @@ def _within(case: Case, offsets: Offsets | None, window_s: Window) -> Astray | N
     return Astray(float(np.sqrt(np.mean(level**2))), float(level.max()), offsets.against)
 
 
-def _inside(case: Case, t_s: Array, window_s: Window) -> Array:
+def _inside(case: Case, t_s: Array, window_s: Window) -> NDArray[np.bool_]:
     begin, end = max(window_s[0], case.flight_s[0]), min(window_s[1], case.flight_s[1])
     return np.asarray((t_s >= begin) & (t_s <= end))
 

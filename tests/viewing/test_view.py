@@ -252,9 +252,8 @@ def test_a_file_that_the_disk_does_not_hold_is_not_written_and_said(tmp_path, mi
     write_rrd(awkward(), tmp_path / "whole.rrd")
     size = (tmp_path / "whole.rrd").stat().st_size
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(
-        resource.RLIMIT_FSIZE, (size - 1_500 - missing, before[1])
-    )  # the sizes of two differ by up to 200
+    limit = size - 1_500 - missing  # the sizes of two differ by up to 200 bytes
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, before[1]))
     try:
         with pytest.raises(OSError, match="too large"):
             write_rrd(awkward(), tmp_path / "x.rrd")

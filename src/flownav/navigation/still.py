@@ -55,8 +55,8 @@ GYRO_FLOOR_RAD_S = 3e-4  # chosen: 6 s of rest leave 0.0002 rad/s of bias (navig
 # What a vehicle whose motors run turns over the whole of a stand: about down it slips as the rotors spin up (0.4 to 2.8
 # deg in logs of small drones), and it settles on what carries it.
 SLIP_RAD, SETTLE_RAD = 0.05, 0.02
-# What one turns about down over the whole of a quiet stand: a helicopter whose rotor spools up turns by 0.2 deg/s on its
-# skids, as quietly as one at rest (heli_sitl), and one such window is no bias of 0.2 deg/s
+# What one turns about down over the whole of a quiet stand: a helicopter whose rotor spools up turns by 0.2 deg/s on
+# its skids, as quietly as one at rest (heli_sitl), and one such window is no bias of 0.2 deg/s
 REST_RAD = 0.002
 BELIEVED_SIGMAS = 2.0  # a bias that rest contradicts by more is opened: chosen, half a usual gate
 

@@ -95,7 +95,7 @@ def _show(found: dict[str, Any]) -> None:
     if likely:
         likely.sort(key=lambda row: (bool(row["consequence_of"]), -row["probability"]))
         say(table_of(TRIED, likely, left=1, title="Hypotheses that remained"))
-    say(f"Looked for: {', '.join(row['cause'] for row in found['checked'])}.")
+    say(f"Looked for: {', '.join(row['cause'].replace('_', ' ') for row in found['checked'])}.")
     for row in found["missing"]:
-        say(f"Not looked into, {row['cause']}: {row['what']}.")
+        say(f"Not looked into, {row['cause'].replace('_', ' ')}: {row['what']}.")
     say_files(found, ("page", "parameters"))

@@ -84,7 +84,7 @@ def test_each_log_has_its_estimators_and_each_row_its_keys(garden, hall):
 def test_a_log_with_gps_whole_says_what_its_place_shows(garden):
     whole = " ".join(call(garden, "--outages", "15:35:10").stdout.split())
     assert "receiver's own slow error" in whole
-    assert "The columns cut do: the rms drift through 10 s without GPS." in whole
+    assert "The columns named cut show that: the rms drift through 10 s without GPS." in whole
 
 
 def test_a_log_with_nothing_to_hold_it_against_says_so(hall, tmp_path):

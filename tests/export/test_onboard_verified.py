@@ -117,6 +117,17 @@ def test_settings_of_another_flight_do_not_pass(copy):
     assert any(each.why is None for each in found)
 
 
+@here
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler here")
+@pytest.mark.parametrize("main", ["int main(void) { return }", "int main(void) { return 3; }"])
+def test_a_program_that_does_not_compile_or_ends_is_no_pass(main, copy):
+    """It counted as a place that is not here, and the folder as verified."""
+    (copy / "main.c").write_text(main)
+    found = {each.where: each for each in runs.runs_of(copy, manifest_of(copy))}["its main.c, compiled here"]
+    assert (found.compared, found.equal, found.differs) == (8, 0, 50)
+    assert "has failed" in found.why
+
+
 def test_what_was_changed_is_not_run(copy):
     (copy / "main.c").write_text("changed\n")
     facts = flownav.verify(copy)

@@ -64,7 +64,9 @@ def weaving(t_s: np.ndarray) -> np.ndarray:
 
 def known(truth_ne: np.ndarray | None, truth_t_s: np.ndarray, gps_walk_m_s: float) -> References:
     fixes_t_s = np.arange(0.5, 20.0, 0.2)
-    walked = weaving(fixes_t_s - 0.3) + np.column_stack([gps_walk_m_s * fixes_t_s, np.zeros(len(fixes_t_s))])
+    way, since_s = weaving(fixes_t_s - 0.3), fixes_t_s - fixes_t_s.mean()
+    along = (way - way.mean(axis=0)).T @ since_s  # a walk in this direction turns nothing
+    walked = way + gps_walk_m_s * np.outer(since_s, along / np.linalg.norm(along))
     truth = None if truth_ne is None else {
         "t_s": truth_t_s, "pos_n_m": truth_ne[:, 0], "pos_e_m": truth_ne[:, 1], "pos_d_m": np.zeros(len(truth_t_s)),
     }  # fmt: skip
@@ -91,8 +93,24 @@ def test_drift_against_a_truth_is_that_of_the_cut_alone():
     """The cut begins and ends with the instants that GPS describes: what GPS mends behind it does not count."""
     truth_t_s = np.arange(0.0, 19.9, 0.05)
     found = outage_of(flown(0.1), known((weaving(truth_t_s) + AWAY) @ TURN, truth_t_s, 0.2), 5.3, 15.3)
-    assert found.horizontal_max_m == pytest.approx(0.1 * 10.0, abs=0.12)  # less what turning takes for its own
-    assert found.horizontal_rms_m == pytest.approx(0.1 * 10.0 / np.sqrt(3.0), abs=0.1)
+    assert found.horizontal_max_m == pytest.approx(0.1 * 10.0, abs=0.02)
+    assert found.horizontal_rms_m == pytest.approx(0.1 * 10.0 / np.sqrt(3.0), abs=0.02)
+
+
+def test_a_heading_that_is_wrong_in_a_cut_or_all_the_time_is_an_error_of_the_cut():
+    """No turn of the truth onto the estimate takes it away: GPS shows the truth's north, and no estimate bends that."""
+    truth_t_s = np.arange(0.5, 20.0, 0.2) - 0.3  # at the instants that GPS describes
+    against, angle = known((weaving(truth_t_s) + AWAY) @ TURN, truth_t_s, 0.0), np.radians(20.0)
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    wrong = flown(0.0)
+    wrong.position[:, :2] = wrong.position[:, :2] @ turn
+    expected = outage_of(wrong, against._replace(truth=None), 5.3, 15.3)
+    found = outage_of(wrong, against, 5.3, 15.3)
+    assert expected.horizontal_max_m > 3.0
+    assert found.horizontal_max_m == pytest.approx(expected.horizontal_max_m, abs=1e-6)
+    late = flown(0.0)
+    late.position[T_S > 5.0, :2] = wrong.position[T_S > 5.0, :2]
+    assert outage_of(late, against, 5.3, 15.3).horizontal_max_m == pytest.approx(found.horizontal_max_m, abs=1e-9)
 
 
 def test_an_outage_without_any_reference_is_an_error():

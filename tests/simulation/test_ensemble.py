@@ -57,6 +57,18 @@ def test_what_a_scenario_fixes_is_drawn_in_no_flight():
     assert len(entries) == len(setup("approach").dispersion) - 2
 
 
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("wind.from_direktion_deg", r"wind\.from_direktion_deg: no such number; known there"),
+        ("wnd.from_direction_deg", r"wnd\.from_direction_deg: no such source; known: vehicle, "),
+    ],
+)
+def test_a_misspelt_fixed_number_would_be_drawn_and_is_one_line(name, message):
+    with pytest.raises(InputError, match=rf"^approach: dispersion\.{message}"):
+        setup("approach", dispersion={"fixed": [name]}).ensemble()
+
+
 # -- what is drawn -----------------------------------------------------------------------------------------------
 def test_uniforms_are_uniform_and_each_name_and_seed_has_its_own():
     first = uniforms(1, range(20_000), "vehicle.body.mass_kg")

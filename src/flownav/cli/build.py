@@ -99,7 +99,7 @@ def verify(
             f"{facts['t_s']:.6f} s): here {facts['expected']}, there {facts['said']}; "
             f"after {facts['same']} all was equal"
         )
-    if wrong := [f"{each['where']} after {each['differs']} readings" for each in facts["ran"] if each["differs"]]:
+    if wrong := [_difference(each) for each in facts["ran"] if each["differs"]]:
         raise VerdictError(f"{what}: the folder's own code differs: {', '.join(wrong)}")
 
 
@@ -110,3 +110,9 @@ def _say_found(facts: dict[str, Any]) -> None:
     for each in facts["ran"]:
         found = f"not run, {each['why']}" if each["why"] else f"{each['equal']} of {each['compared']} digests are equal"
         typer.echo(f"{each['where']}: {found}")
+
+
+def _difference(ran: dict[str, Any]) -> str:
+    """Where a folder's own code differs, after how many readings, and why it failed where it did."""
+    why = f" ({ran['why']})" if ran["why"] else ""
+    return f"{ran['where']} after {ran['differs']} readings{why}"

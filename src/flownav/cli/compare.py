@@ -25,7 +25,7 @@ SHORT = (
 )  # fmt: skip
 WITH_GPS = (
     "With GPS, place and end show how far the receiver's own slow error carried each estimate, not what flow is worth. "
-    "The columns cut do: the rms drift through {length} s without GPS."
+    "The columns named cut show that: the rms drift through {length} s without GPS."
 )
 TITLE = "rms errors where all estimators of a log have rows; end drift; GPS cuts"
 

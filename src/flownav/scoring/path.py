@@ -96,10 +96,11 @@ def path_scores(estimate: Mapping[str, Column], known: References) -> dict[str, 
 def outage_of(path: Path, known: References, t0: float, t1: float) -> OutageError:
     """The outage error over a window.
 
-    It is against the log's truth, turned onto the estimate and taken at the instants that GPS would describe, or
-    against GPS, whose own slow errors count as drift, where there is no truth. ValueError without either.
+    It is against the log's truth, turned onto GPS's north and taken at the instants that GPS describes, or against
+    GPS, whose own slow errors count as drift, where there is no truth. A truth that no GPS shows the north of is turned
+    onto the estimate. ValueError without either.
     """
-    placed, truth = truth_alignment(path, known.truth), known.truth
+    placed, truth = _truth_by_gps(known) or truth_alignment(path, known.truth), known.truth
     if placed is not None and truth is not None:
         t_s, value = np.asarray(truth["t_s"], float) + known.gps_delay_s, placed.turned(columns_of(truth, POSITION_NED))
     elif known.fixes is not None:
@@ -107,6 +108,15 @@ def outage_of(path: Path, known: References, t0: float, t1: float) -> OutageErro
     else:
         raise ValueError("an outage is scored against a truth or GPS, and there is neither")
     return outage_error(path.t_s, path.position[:, :2], t_s, value[:, :2], known.gps_delay_s, t0, t1)
+
+
+def _truth_by_gps(known: References) -> Alignment | None:
+    """How the truth lies in GPS's frame, which no estimate bends; None where the two do not show it."""
+    if known.fixes is None:
+        return None
+    t_s, value = known.fixes
+    placed = truth_alignment(Path(t_s - known.gps_delay_s, value, value[:, :2]), known.truth)
+    return placed if placed is not None and placed.yaw_shown else None
 
 
 def outage_entry(error: OutageError) -> dict[str, float | None]:

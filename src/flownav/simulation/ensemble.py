@@ -108,6 +108,8 @@ class Ensemble:
         self.reach = {f"vehicle.{entry.key}": entry.uncertainty for entry in described.entries}
         self.entries = {name: one for name, one in dispersion.items() if self._is_fitted(name)}
         self.frozen = {name: self._checked(name, one) for name, one in self.entries.items()}
+        for name in filter(self._is_fitted, scenario.dispersion.fixed):
+            self.believed_of(name)  # a misspelt name would leave its number drawn
         self._chunk = lru_cache(maxsize=16)(self._drawn)
 
     def truths(self, seed: int, first: int, count: int) -> list[Truth]:

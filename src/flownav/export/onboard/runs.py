@@ -33,9 +33,13 @@ class NotHereError(Exception):
     """The folder's code cannot run in this place: why."""
 
 
+class FailedError(Exception):
+    """The folder's code does not compile, or ends, in a place that has all it needs: how."""
+
+
 class Ran(NamedTuple):
     """A place where the vectors were run: how many digests were compared and are equal, after how many readings the
-    first differs, and, where nothing was run, why.
+    first differs, and, where nothing was run, or it failed, why.
     """
 
     where: str
@@ -65,6 +69,8 @@ def runs_of(folder: Path, manifest: dict[str, Any]) -> Iterator[Ran]:
             reported = run(built)
         except NotHereError as reason:
             yield Ran(where, 0, 0, why=str(reason))
+        except FailedError as reason:
+            yield compared(where, (), manifest["digests"])._replace(why=str(reason))
         else:
             yield compared(where, reported, manifest["digests"])
 
@@ -101,8 +107,11 @@ def as_program(built: Built) -> Sequence[str]:
     sources = [built.folder / name for name in ("main.c", "flownav_settings.c", targets.LIBRARY)]
     with TemporaryDirectory() as temporary:
         program = Path(temporary) / "check"
-        _output([compiler, "-O2", *sources, "-o", program])
-        lines = _output([program]).splitlines()
+        try:
+            _output([compiler, "-O2", *sources, "-o", program])
+            lines = _output([program]).splitlines()
+        except NotHereError as reason:
+            raise FailedError(str(reason)) from None
     return [line.split()[1] for line in lines if line[:1].isdigit()]
 
 

@@ -62,10 +62,11 @@ export const horizontalRms = (estimate, reference) => {
   return rows.length ? Math.sqrt(mean(squared(rows))) : null;
 };
 
-// An outage of GPS: horizontal error against the truth, turned onto the path, at the instants that GPS would describe, or
-// against its fixes where there is no truth; less the mean of the window's first five.
+// An outage of GPS: horizontal error against the truth, turned onto GPS's north (or, where GPS does not show it, onto the
+// path), at the instants that GPS describes, or against its fixes where there is no truth; less the mean of the first five.
 export function outage(path, gps, truth, delayS, [t0, t1]) {
-  const placed = truth && truthPlaced(path, truth);
+  const byGps = truth && truthPlaced({ t: gps.t.map((t) => t - delayS), columns: gps.columns }, truth);
+  const placed = byGps && byGps.shown ? byGps : truth && truthPlaced(path, truth);
   const fixes = !placed ? gps : {
     t: Float64Array.from(truth.t_s, (t) => t + delayS),
     columns: ((rows) => [0, 1].map((k) => rows.map((row) => row[k])))(rowsOf(truth).map(placed.turned)),
@@ -79,6 +80,8 @@ export function outage(path, gps, truth, delayS, [t0, t1]) {
   return { t0, t1, horizontal_rms_m: Math.sqrt(mean(squares)), horizontal_max_m: Math.sqrt(most(squares)) };
 }
 
+const LEAST_SPREAD_M = 0.2, LEAST_LIKENESS = 0.5;
+
 // The truth turned and shifted onto the estimate (least squares in the horizontal plane).
 export function align(ours, theirs) {
   const a = [0, 1, 2].map((k) => along(ours, k)), b = [0, 1, 2].map((k) => along(theirs, k)), re = [], im = [];
@@ -90,7 +93,10 @@ export function align(ours, theirs) {
   const cosine = length > 0 ? x / length : 1, sine = length > 0 ? y / length : 0;
   const turned = ([n, e, z]) => [cosine * n - sine * e, sine * n + cosine * e, z];
   const shift = turned(b).map((value, k) => a[k] - value);
-  return { turned, moved: (row) => turned(row).map((value, k) => value + shift[k]) };
+  const spread = (rows, middle) => Math.sqrt(mean(rows.map((row) => (row[0] - middle[0]) ** 2 + (row[1] - middle[1]) ** 2)));
+  const wide = [spread(ours, a), spread(theirs, b)], likeness = length / Math.max(ours.length * wide[0] * wide[1], 1e-12);
+  const shown = Math.min(...wide) >= LEAST_SPREAD_M && likeness >= LEAST_LIKENESS; // as scoring/reference.py
+  return { turned, shown, moved: (row) => turned(row).map((value, k) => value + shift[k]) };
 }
 
 const SPAN_S = 0.1;

@@ -68,7 +68,7 @@ function stream(fed, sensor, columns) {
 export function scores(flown, fed, truth, delayS, cut) {
   const path = { t: flown.estimates.map((row) => row.t_s), columns: [0, 1, 2].map((k) => flown.estimates.map((row) => row.pos_ned_m[k])) };
   const moving = flown.estimates.map(velocityNe), velocity = { t: path.t, columns: [0, 1].map((k) => moving.map((row) => row[k])) };
-  const fixes = stream(fed, SENSOR.GPS_POSITION, 2), speeds = stream(fed, SENSOR.GPS_VELOCITY, 2);
+  const fixes = stream(fed, SENSOR.GPS_POSITION, 3), speeds = stream(fed, SENSOR.GPS_VELOCITY, 2);
   const known = speeds.t.map((_, i) => i).filter((i) => speeds.columns.every((c) => Number.isFinite(c[i])));
   const told = { t: known.map((i) => speeds.t[i] - delayS), columns: speeds.columns.map((c) => known.map((i) => c[i])) };
   const against = truth ? figures.truthScores(path, velocity, truth) : null;

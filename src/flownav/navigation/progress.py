@@ -7,6 +7,7 @@ Waiting readings stand in `waiting`, and `onboard` processes them.
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flownav.core.compile import ONE_LANE, Layout, Work, equation, procedure, replacing
 from flownav.core.measurement import Array, Sensor
@@ -91,12 +92,12 @@ with_withheld = replacing(Arrival, "withheld")
 waiting_until = replacing(Equipment, "deadline_s")
 
 
-def fresh_rows() -> tuple[Array, Array]:
-    """The rows of a new navigator that are not 0, and their values."""
+def fresh_rows() -> tuple[NDArray[np.uint16], Array]:
+    """The rows of a new navigator that are not 0, in numbers as short as a small board likes, and their values."""
     work = new_work(ONE_LANE)[:BOARD_ROWS].reshape(-1, 1)
     BOARD.put_fresh(work)
     places = np.flatnonzero(work[:, 0] != 0.0)
-    return places.astype(float), np.ascontiguousarray(work[places, 0])
+    return places.astype(np.uint16), np.ascontiguousarray(work[places, 0])
 
 
 FRESH_ROWS, FRESH_VALUES = fresh_rows()
@@ -109,7 +110,7 @@ def begin_anew(work: Work, r: Work, p: Work) -> None:
     for i in range(BOARD_ROWS):
         work[i] = 0.0
     for i in range(len(FRESH_ROWS)):
-        work[int(FRESH_ROWS[i])] = FRESH_VALUES[i]
+        work[FRESH_ROWS[i]] = FRESH_VALUES[i]
     if load_pace(p).protects == 0.0:
         work[HYPOTHESES] = 0.0
     waiting.empty(r)

@@ -211,7 +211,9 @@ def machine_code(
     tuning.inlining_threshold = INLINING
     tuning.loop_vectorization = tuning.slp_vectorization = tuning.loop_unrolling = False
     passes = llvm.create_pass_builder(machine, tuning)
-    passes.getModulePassManager().run(module, passes)
+    whole = passes.getModulePassManager()
+    whole.add_merge_functions_pass()  # units that read one law have its code once
+    whole.run(module, passes)
     return bytes(machine.emit_object(module))
 
 

@@ -45,7 +45,7 @@ def offset(case: Case) -> Found:
     """A drift fixed in the body's axes: what the flow reads where nothing moves."""
     if case.flow is None:
         return NO_FLOW
-    known = [one for one in (case.measured, case.measured_by_gps) if one is not None and one.offset is not None]
+    known = _known_offsets(case)
     if not known:
         return Lack("no reference and no GPS that moves enough to hold the flow's offset against")
     least = min(known, key=_surely_off) if _contradict(known) else known[0]
@@ -54,6 +54,14 @@ def offset(case: Case) -> Found:
     figures: dict[str, float | str] = {"x": x.value, "y": y.value, "reference": least.flown.reference_name}
     picture = offset_picture(case, x.value, y.value)
     return Sign(_surely_off(least) / OFFSET_RAD_S, case.flight_s, figures, (picture,))
+
+
+def _known_offsets(case: Case) -> list[Measured]:
+    """Measurements that have an offset: by the reference, and by GPS too where the first could be a sign."""
+    first = case.measured
+    if first is not None and first.offset is not None and _surely_off(first) < 0.5 * OFFSET_RAD_S:
+        return [first]
+    return [one for one in (first, case.measured_by_gps) if one is not None and one.offset is not None]
 
 
 def _contradict(known: list[Measured]) -> bool:

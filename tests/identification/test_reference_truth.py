@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_identification_flight import GAIN_X, GAIN_Y, written
 
+from flownav.core.measurement import Sensor, Stream
 from flownav.lab.identification.first_look import judged
-from flownav.lab.identification.flight_identification import identify_flight
+from flownav.lab.identification.flight_identification import identify_flight, measured
 from flownav.lab.identification.quantities import CANDIDATES
-from flownav.lab.identification.reference_truth import drift_throughout
+from flownav.lab.identification.reference_truth import drift_at_rest, drift_throughout
 from flownav.logs.open_log import open_flight
 
 FROM_S, TO_S = 70.2, 85.0
@@ -80,3 +83,61 @@ def test_a_reference_that_drifts_all_the_time_gives_the_flow_no_offset(tmp_path,
     assert drift == (pytest.approx(abs(speed), abs=0.02) if speed else None)
     found = identify_flight(folder, CANDIDATES).offset
     assert (found is not None and found.matters) == bool(offset)
+
+
+STANDS = Stream.of(Sensor.LANDED, np.array([0.0, 10.0, 90.0]), np.array([[1.0], [0.0], [1.0]]))
+
+
+def at_rest(t_s):
+    """A level path that stands to 10 s and from 90 s on, and goes round between."""
+    angle = 0.4 * (np.clip(t_s, 10.0, 90.0) - 10.0)
+    return np.column_stack([3.0 * np.sin(angle), 3.0 * np.cos(angle), 0.0 * t_s])
+
+
+@pytest.mark.parametrize(("spoilt", "speed"), [
+    (lambda t, place: place + np.outer(t, [0.06, -0.08, 0.0]), 0.1),
+    (lambda t, place: place, None),
+    (lambda t, place: place + np.outer(t, [0.02, 0.0, 0.0]), None),  # too slow to say
+    (lambda t, place: place + np.outer(np.maximum(t - 50.0, 0.0), [0.1, 0.0, 0.0]), None),  # stood at first
+    (lambda t, place: place + np.outer(np.sin(0.3 * t), [0.5, 0.0, 0.0]), None),  # never steady
+    (lambda t, place: place + np.outer(t, [0.0, 0.0, 0.5]), None),  # sinks, which no level offset looks like
+])  # fmt: skip
+def test_a_reference_that_moves_steadily_while_the_vehicle_stands_drifts(tmp_path, spoilt, speed):
+    flown = judged(open_flight(written(tmp_path / "flight", turned_rad=0.0)), "truth").flown
+    t_s = np.arange(0.0, 100.0, 0.02)
+    flown = replace(flown, reference_t_s=t_s, reference_m=spoilt(t_s, at_rest(t_s)))
+    assert drift_at_rest(flown, STANDS) == (pytest.approx(speed, rel=1e-6) if speed else None)
+    assert drift_at_rest(flown, None) is None
+    assert drift_at_rest(replace(flown, reference="gps"), STANDS) is None
+    brief = Stream.of(Sensor.LANDED, np.array([0.0, 4.0]), np.array([[1.0], [0.0]]))
+    assert drift_at_rest(flown, brief) is None
+
+
+def test_a_drift_that_only_the_rest_shows_is_no_offset_of_the_flow(tmp_path):
+    """Nose north and height kept: an offset of the flow and a drift of the reference look alike in flight."""
+    t_s = np.arange(0.0, 100.0, 0.02)
+    place = at_rest(t_s)
+    velocity = np.gradient(place, t_s, axis=0)
+    still, one = np.zeros(len(t_s)), np.ones(len(t_s))
+    force = np.gradient(velocity, t_s, axis=0)
+    range_m = np.where((t_s > 9.0) & (t_s < 91.0), 2.0, 0.12)
+    seen = velocity[:, :2] / range_m[:, None] + 0.01 * np.random.default_rng(3).standard_normal((len(t_s), 2))
+    forces = "accel_x_m_s2,accel_y_m_s2,accel_z_m_s2"
+    tables = {
+        "imu.csv": (f"gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,{forces}", [*3 * [still], *force[:, :2].T, -9.8 * one]),
+        "attitude.csv": ("roll_rad,pitch_rad,yaw_rad", 3 * [still]),
+        "flow.csv": ("flow_x_rad_s,flow_y_rad_s,gyro_x_rad_s,gyro_y_rad_s,quality",
+                     [-seen[:, 1], seen[:, 0], still, still, 200.0 * one]),
+        "range.csv": ("range_m,valid", [range_m, one]),
+        "truth.csv": ("x_m,y_m,z_m", [place[:, 0] + 0.1 * t_s, place[:, 1], -range_m]),
+    }  # fmt: skip
+    for name, (header, columns) in tables.items():
+        rows = np.column_stack([t_s, *columns])
+        np.savetxt(tmp_path / name, rows, delimiter=",", header="t_s," + header, comments="", fmt="%.9g")
+    unknown = measured(open_flight(tmp_path), "truth")
+    assert unknown.offset is not None
+    assert unknown.offset.y.value == pytest.approx(-0.05, abs=0.005)  # as it looks where nobody knows when it stood
+    (tmp_path / "landed.csv").write_text("t_s,landed\n0,1\n10,0\n90,1\n")
+    known = measured(open_flight(tmp_path), "truth")
+    assert known.offset is None
+    assert "drifts by 0.10 m/s all the time" in known.flown.notes[-1]

@@ -58,6 +58,16 @@ def test_numbers_that_a_spreadsheet_wrote_are_read(tmp_path):
     np.testing.assert_allclose(stream.t_s, 0.01 * np.arange(98), atol=1e-9)
 
 
+def test_a_heading_that_its_stated_16_bits_do_not_hold_is_read(tmp_path):
+    text = tmp_path / "log.log"
+    kind = "FMT, 130, 40, ATT, Qccc, TimeUS,Roll,Pitch,Yaw"
+    headings = [359.9, 0.1, -0.2, 327.68] * 25
+    text.write_text("\n".join([kind, *(f"ATT, {k}0000, 1.5, -2, {yaw}" for k, yaw in enumerate(headings))]) + "\n")
+    w, x, y, z = open_log(text).streams[Sensor.ATTITUDE].value.T
+    yaw_deg = np.degrees(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y**2 + z**2)))
+    np.testing.assert_allclose((yaw_deg - headings + 180.0) % 360.0, 180.0, atol=1e-6)
+
+
 def topic_folder(tmp_path, log, name="flight"):
     """The files of PX4's own tool."""
     file = ulog_of_flight(log.tables).write(tmp_path / f"{name}.ulg")

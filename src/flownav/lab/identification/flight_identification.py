@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.errors import InputError
-from flownav.core.measurement import Array
+from flownav.core.measurement import Array, Sensor
 from flownav.lab.identification.descent import Structure
 from flownav.lab.identification.experiment import Experiment, experiment
 from flownav.lab.identification.findings import Findings, Noise, Response, noise_of
@@ -34,7 +34,7 @@ from flownav.lab.identification.reference_motion import (
     flow_likeness,
     with_flow,
 )
-from flownav.lab.identification.reference_truth import drift_throughout
+from flownav.lab.identification.reference_truth import drift_at_rest, drift_throughout
 from flownav.lab.identification.scale import Match, against_speed, match
 from flownav.logs.log import Log
 from flownav.logs.open_log import open_flight
@@ -130,7 +130,8 @@ def measured(log: Log, reference: str = "auto") -> Measured:
         age_s = _age(flown, moved)
     scale, track = _scale(flown, moved, age_s, put_right)
     offset = flow_offset(flown, moved, put_right, scale.response, age_s)
-    drift_m_s = drift_throughout(flown, moved) if offset is not None and offset.matters else None
+    doubted, landed = offset is not None and offset.matters, log.streams.get(Sensor.LANDED)
+    drift_m_s = (drift_throughout(flown, moved) or drift_at_rest(flown, landed)) if doubted else None
     if drift_m_s is not None:
         drifting = f"the reference: {flown.reference_name} drifts by {drift_m_s:.2f} m/s all the time"
         note = f"{drifting}; no offset of the flow is identified"

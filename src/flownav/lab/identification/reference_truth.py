@@ -5,11 +5,12 @@ the piece that agrees better with the flow, or the longer one, is identified. Ea
 """
 
 from dataclasses import replace
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
-from flownav.core.measurement import Array
+from flownav.core.measurement import Array, Stream
 from flownav.lab.identification.flight import LEAST_FLOW, Flight
 from flownav.lab.identification.reference_motion import Motion, on_grid
 from flownav.logs.log import mean_over
@@ -20,6 +21,8 @@ BLOCK_S, LEAST_PIECE_S, LEAST_BLOCKS = 1.0, 12.0, 24
 DRIFT_M_S, TURN_RAD = 0.25, 0.2  # from which on a piece differs from the other
 BETTER = 0.6  # of the residual's power, that two pieces leave of one's
 CLEARLY_LESS = 0.8  # of the residual's power, that a drifting reference leaves of an offset's
+REST_S, REST_BESIDE_S = 3.0, 1.0  # on the ground without a break, with which a drift is measured, and at either end
+LEAST_DRIFT_M_S, ALIKE = 0.03, 0.3  # chosen: slower, or apart by more than such a share, is no steady drift
 
 
 class Mended(NamedTuple):
@@ -106,6 +109,34 @@ def drift_throughout(flown: Flight, moved: Motion) -> float | None:
     _, by_offset = _solved(flow, ahead, reference - ahead, lever)
     gain = abs(_fitted(flow, reference)[0])
     return float(abs(drift) / gain) if left < CLEARLY_LESS * by_offset and gain > 1e-3 else None
+
+
+def drift_at_rest(flown: Flight, landed: Stream | None) -> float | None:
+    """The speed at which the reference moves while the vehicle stands [m/s], the same in every half of every rest.
+
+    None where it stands as well, moves unsteadily (a landed state that is wrong), or there is no landed state. In the
+    flight of a vehicle that keeps nose and height an offset of the flow and a drift of the reference look alike.
+    """
+    if flown.reference != "truth" or landed is None:
+        return None
+    ends_s = np.append(landed.t_s[1:], flown.reference_t_s[-1])
+    halves = []
+    for begin, end, stands in zip(landed.t_s, ends_s, landed.value[:, 0], strict=True):
+        first, last = begin + REST_BESIDE_S, end - REST_BESIDE_S
+        if stands and last - first >= REST_S:
+            middle = 0.5 * (first + last)
+            halves += [_mean_velocity(flown, first, middle), _mean_velocity(flown, middle, last)]
+    if not halves:
+        return None
+    speed = float(np.linalg.norm(np.mean(halves, axis=0)))
+    apart = max(float(np.linalg.norm(one - other)) for one, other in combinations(halves, 2))
+    return speed if speed >= LEAST_DRIFT_M_S and apart <= ALIKE * speed else None
+
+
+def _mean_velocity(flown: Flight, begin_s: float, end_s: float) -> Array:
+    """Of the reference, level, shape (2,) [m/s]."""
+    ends = on_grid(flown.reference_t_s, flown.reference_m[:, :2], np.array([begin_s, end_s]))
+    return np.asarray((ends[1] - ends[0]) / (end_s - begin_s))
 
 
 class _Blocks(NamedTuple):

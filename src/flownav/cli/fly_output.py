@@ -9,7 +9,7 @@ from flownav.cli.output import figure, plain_look, say, table
 from flownav.core.text import interval_words
 from flownav.scoring.headline import sentence
 
-WIDE = 80  # columns that one flight beside a published table takes
+WIDE = NARROW = 80  # columns of a terminal, and those that one flight beside a published table takes
 WIDEST = 104  # columns that the medians and percentiles of many flights take, beside a published table
 STATISTICS, PRINTED = ("mean", "std", "rms", "max"), ("mean", "std")
 FLIGHTS_FOR_R95 = 20  # of fewer the radius would be that of the largest
@@ -63,8 +63,9 @@ def show(facts: dict[str, Any], manifest: Mapping[str, Any], median: int) -> Non
     if "paper_percentile" in facts:
         say(_percentiles(facts["paper_percentile"]))
     which = f" (flight {median}, the one with the median largest error)" if many else ""
-    page = f"   report  {facts['report']}" if "report" in facts else ""
-    say(f"record  {facts['record']}{which}{page}", soft=True)
+    files = [f"record  {facts['record']}{which}", *([f"report  {facts['report']}"] if "report" in facts else [])]
+    together = "   ".join(files)
+    say(*([together] if len(together) <= NARROW else files), soft=True)
 
 
 def receiver(facts: Mapping[str, Any]) -> str:

@@ -278,6 +278,14 @@ def _with_columns(made: Table, chosen: list[int], title: Any = None) -> Table:
     return part
 
 
+def by_reason(pairs: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
+    """The names that share a reason in one text, and the reason, from pairs of a name and its reason."""
+    names: dict[str, list[str]] = {}
+    for name, why in pairs:
+        names.setdefault(why, []).append(name)
+    return [(", ".join(shared), why) for why, shared in names.items()]
+
+
 def say_files(written: Mapping[str, Any], names: Iterable[str]) -> None:
     """Where what was written lies, a line a file."""
     for name in names:

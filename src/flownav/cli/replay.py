@@ -35,6 +35,10 @@ OUTAGE_COLUMNS = (
     Column("rms [m]", "horizontal_rms_m", ".2f"),
     Column("max [m]", "horizontal_max_m", ".2f"),
 )
+WITH_GPS = (
+    "With GPS these show how far the receiver's own slow error carried the estimate, not what flow is worth: that is "
+    "the drift while GPS is cut (--gps-outage)"
+)
 OUTAGE = "Withhold GPS from T0 to T1 [s]; repeated or with commas."
 OUTAGES = "Windows of LENGTH from T0 to T1 [s]: one replay each, with GPS withheld in it."
 VERBOSE = "Also the figures behind each sensor's verdict, and what was not fused."
@@ -161,6 +165,8 @@ def error_lines(scores: dict[str, Any]) -> list[str]:
     if scores["end_drift_m"] is not None:
         laid = f"{scores['truth']['reference']} laid on it at take-off"
         sentences.append(f"At the end of the flight, {laid}: {scores['end_drift_m']:.2f} m off")
+    if truth and "gps_position" in scores["coverage"]:
+        sentences.append(WITH_GPS)
     if scores["protection"]:
         sentences.append(_protection(scores["protection"]))
     if "smoothed" in scores:
@@ -280,7 +286,7 @@ def _print(facts: dict[str, Any]) -> None:
 
     say(f"{facts['log']}: {facts['end_s'] - facts['start_s']:.1f} s")
     say(
-        f"Why it drifted: {facts['explained']}" if facts["causes"] else facts["explained"],
+        f"A cause of drift: {facts['explained']}" if facts["causes"] else facts["explained"],
         f"Verdict: {facts['verdict']}",
     )
     say(*(f"Cannot be replayed: {obstacle}" for obstacle in facts["obstacles"]))

@@ -35,10 +35,6 @@ OUTAGE_COLUMNS = (
     Column("rms [m]", "horizontal_rms_m", ".2f"),
     Column("max [m]", "horizontal_max_m", ".2f"),
 )
-WITH_GPS = (
-    "With GPS these show how far the receiver's own slow error carried the estimate, not what flow is worth: that is "
-    "the drift while GPS is cut (--gps-outage)"
-)
 OUTAGE = "Withhold GPS from T0 to T1 [s]; repeated or with commas."
 OUTAGES = "Windows of LENGTH from T0 to T1 [s]: one replay each, with GPS withheld in it."
 VERBOSE = "Also the figures behind each sensor's verdict, and what was not fused."
@@ -150,6 +146,8 @@ def show(record: Record, scores: dict[str, Any], *, verbose: bool = False) -> No
 
 def error_lines(scores: dict[str, Any]) -> list[str]:
     """The errors against each reference that there is, a sentence a line."""
+    from flownav.scoring.headline import WITH_GPS
+
     sentences, truth = [], scores.get("truth")
     if "outage_median_rms_m" in scores:
         median, worst = figure(scores["outage_median_rms_m"]), figure(scores["outage_worst_rms_m"])
@@ -166,7 +164,7 @@ def error_lines(scores: dict[str, Any]) -> list[str]:
         laid = f"{scores['truth']['reference']} laid on it at take-off"
         sentences.append(f"At the end of the flight, {laid}: {scores['end_drift_m']:.2f} m off")
     if truth and "gps_position" in scores["coverage"]:
-        sentences.append(WITH_GPS)
+        sentences.append(f"{WITH_GPS} (--gps-outage)")
     if scores["protection"]:
         sentences.append(_protection(scores["protection"]))
     if "smoothed" in scores:

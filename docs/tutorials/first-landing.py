@@ -48,7 +48,7 @@ print(f"touched {contact['distance_m']:.2f} m from the pad's centre, sinking at 
 #
 # `record.flown` is a table: a dictionary of NumPy arrays, whose names end in their units. It is the estimate used by
 # the autopilot: the navigator's estimate of each instant, relative to the pad. `pos_d_m` is the position downwards,
-# so that the height is its negative.
+# so that the height is its negative: that of the centre of gravity, 0.2 m above the ground when it stands.
 
 # %%
 flown = record.flown.to_pandas()
@@ -115,8 +115,8 @@ record.plot("path")
 # %%
 windy = flownav.fly(seed=1, wind="8:270")
 blind = flownav.fly("pad_return", seed=1)
-for flown in (windy, blind):
-    print(f"{flown.scores['touchdown']['contact']['distance_m']:.2f} m from the pad's centre")
+for flight in (windy, blind):
+    print(f"{flight.scores['touchdown']['contact']['distance_m']:.2f} m from the pad's centre")
 
 # %% [markdown]
 # ## Where to go from here

@@ -48,8 +48,9 @@ assert rms_m["identified"] < rms_m["as it comes"]
 # The identified sensor drifts less. Both rows count from the moment of the cut, against the simulator's truth: what GPS
 # was off by until then, a slow error of metres that is common to all estimates, is taken out.
 # The gain costs less than one would think, because the filter learns the scale of the flow while it has GPS. The
-# sensor file gives it a better start and the right latency. Judge a sensor on another flight than the one that it
-# was identified from when you can. Here there is only one.
+# sensor file gives it a better start, the noise at each height, and the most likely latency, although this log shows
+# the latency too vaguely to write it into an autopilot. Judge a sensor on another flight than the one that it was
+# identified from when you can. Here there is only one.
 #
 # ## Parameters for the autopilot
 #

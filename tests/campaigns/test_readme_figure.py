@@ -5,14 +5,17 @@ from __future__ import annotations
 import json
 import re
 
+import pytest
 from typer.testing import CliRunner
 
+from docs_tools import figures_book
 from flownav.campaigns.requirement import load_requirement
 from flownav.cli import app
 from places import DOCS, PROJECT
 
 README = (PROJECT / "README.md").read_text(encoding="utf-8")
 FLIGHTS = 96
+BOOK = figures_book.read()
 
 
 FIGURE = re.compile(
@@ -34,6 +37,21 @@ def test_readme_requirement_and_accuracy_page_say_one_figure():
     )
     assert float(row[2]) == figure_m()
     assert float(row[1]) <= figure_m()
+
+
+@pytest.mark.parametrize(("case", "flights", "figure"), [
+    ("pad_return", "ensemble", "accuracy-pad-return.rest_r95_m"),
+    ("approach", "matched", "accuracy.approach_matched_rest_r95_m"),
+    ("approach", "ensemble", "accuracy.approach_rest_r95_m"),
+    ("approach_8_m_s", "matched", "accuracy.windy_matched_rest_r95_m"),
+    ("approach_8_m_s", "ensemble", "accuracy.windy_rest_r95_m"),
+])  # fmt: skip
+def test_the_tables_of_the_accuracy_page_have_the_figures_of_the_book(case, flights, figure):
+    page = (DOCS / "explanation" / "accuracy.md").read_text(encoding="utf-8")
+    table = re.search(rf"^\| {flights}: touchdown .*?\n\n", page, re.M | re.S)[0]
+    row = re.search(rf"^\| {case} +\| [\d.]+ \([^|]*\) +\| ([\d.]+) \(([\d.]+)-([\d.]+)\) ", table, re.M)
+    noted = BOOK.figures[figure]
+    assert [float(row[k]) for k in (1, 2, 3)] == [round(value, 3) for value in (noted.value, *noted.interval)]
 
 
 def test_fewer_flights_of_the_certificate_keep_the_figure(tmp_path):

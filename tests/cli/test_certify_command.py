@@ -47,6 +47,10 @@ def test_the_plan_is_told_and_nothing_is_flown(tmp_path):
     assert printed.exit_code == 0
     for number in ("45", "77", "105", "767", "1296", "1773"):
         assert number in printed.stdout
+    below = " ".join(printed.stdout.split("└")[-1].split("\n", 1)[1].split())
+    assert below == (
+        "touchdown.rest_m at most 0.03 m with 95 % probability at 90 % confidence: of all 767 flights 30 may fail"
+    )
 
 
 def test_a_pass_is_exit_status_0_and_everything_else_1(tmp_path):

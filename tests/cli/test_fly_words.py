@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from flownav.cli.fly_output import touchdown_lines
+from flownav.cli.fly_output import file_lines, touchdown_lines
 
 GLOSSARY = Path(__file__).parents[2] / "docs" / "explanation" / "glossary.md"
 PARTS = {"estimate_m": 0.0012, "guidance_m": 0.0221, "pad_m": 0.0023}
@@ -39,3 +39,17 @@ def test_of_many_flights_the_parts_are_percentiles_that_add_as_vectors():
         "parts of the distance (they add as vectors), in 95 % of the flights at most  "
         "estimate 0.001 m, guidance 0.022 m, pad's place 0.002 m"
     )
+    few = touchdown_lines(many, 19, 19)
+    assert few[1] == "95 % of the flights, at rest  needs 20 flights"
+    assert not [line for line in few if "parts of the distance" in line]
+
+
+def test_record_and_report_share_a_line_where_it_is_no_wider_than_a_terminal():
+    facts = {"record": "out/sortie.fnr", "report": "out/sortie.html"}
+    assert file_lines(facts) == ["record  out/sortie.fnr   report  out/sortie.html"]
+    which = " (flight 15, the one with the median largest error)"
+    assert file_lines(facts, which) == [f"record  out/sortie.fnr{which}", "report  out/sortie.html"]
+    fits = "x" * (80 - len("record  " + "   report  out/sortie.html"))
+    assert len(file_lines(facts | {"record": fits})) == 1
+    assert len(file_lines(facts | {"record": fits + "x"})) == 2
+    assert file_lines({"record": "r.fnr"}) == ["record  r.fnr"]

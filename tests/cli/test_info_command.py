@@ -313,8 +313,9 @@ def test_a_real_log_of_two_flow_sensors(data_folder):
     (0.2, 1.02, "flow and GPS agree: lag 0.20 s, scale 1.02"),
     (-0.06, 0.88, "flow and GPS agree in shape, not in size and time: the flow reads 12 % too little and it lies "
      "0.06 s behind GPS (lag -0.06 s, scale 0.88)"),
-    (0.0, 1.2, "flow and GPS agree in shape, not in size and time: the flow reads 20 % too much "
-     "(lag 0.00 s, scale 1.20)"),
+    (0.0, 1.2, "flow and GPS agree in shape, not in size: the flow reads 20 % too much (lag 0.00 s, scale 1.20)"),
+    (0.33, 0.99, "flow and GPS agree in shape, not in time: the flow lies 0.33 s ahead of GPS "
+     "(lag 0.33 s, scale 0.99)"),
     (0.0, 0.44, "flow and GPS do not agree in size: alike in shape (correlation 0.97), the flow reads 56 % too little "
      "(lag 0.00 s, scale 0.44)"),
 ])  # fmt: skip

@@ -12,9 +12,10 @@ from pathlib import Path
 
 import pytest
 from rich.console import Console
+from rich.progress import Progress
 
 from flownav.cli import main
-from flownav.cli.output import fitted, say, table
+from flownav.cli.output import by_reason, fitted, say, stages, table
 from flownav.core.parameter_files import shipped
 from flownav.core.record import Record
 from replay_logs import log_of_flight
@@ -242,3 +243,20 @@ def test_into_a_pipe_of_no_width_a_table_is_as_wide_as_it_asks(monkeypatch, caps
     monkeypatch.delenv("COLUMNS", raising=False)
     say(table(["cell", "figure"], [["a", "x" * 100]]), wide=144)
     assert "x" * 100 in capsys.readouterr().out
+
+
+def test_names_that_share_a_reason_stand_in_one_line_in_the_order_of_the_reasons():
+    pairs = [("a", "no GPS"), ("b", "no flow"), ("c", "no GPS")]
+    assert by_reason(pairs) == [("a, c", "no GPS"), ("b", "no flow")]
+    assert by_reason([]) == []
+
+
+def test_a_stage_is_named_while_it_lasts_and_counts_when_the_next_begins(monkeypatch):
+    bar = Progress(console=Console(file=StringIO()))
+    monkeypatch.setattr("flownav.cli.output._bar", lambda: bar)
+    shown = []
+    with stages("Measuring", 3) as begin:
+        for name in ("flights", "a replay", "help"):
+            begin(name)
+            shown.append((bar.tasks[0].description, bar.tasks[0].completed, bar.tasks[0].total))
+    assert shown == [("Measuring flights", 0, 3), ("Measuring a replay", 1, 3), ("Measuring help", 2, 3)]

@@ -48,7 +48,7 @@ def test_the_log_s_page_tells_the_cause_on_top_and_lists_what_was_tried(visits):
     visit = visits["log"]
     verdict = visit.page.locator("header p.summary").first
     assert verdict.is_visible()
-    assert verdict.inner_text().startswith("Why it drifted: The flow sensor's axes are not the vehicle's")
+    assert verdict.inner_text().startswith("A cause of drift: The flow sensor's axes are not the vehicle's")
     section = visit.page.locator("#explained")
     section.scroll_into_view_if_needed()
     assert section.get_by_role("columnheader").all_inner_texts() == list(HEADINGS)

@@ -49,12 +49,13 @@ def test_a_sound_log_ends_well_and_lists_what_was_looked_for(clean, tmp_path):
     assert "Nothing wrong was found" in done.stdout
     assert "Looked for: vibration" in done.stdout.replace("\n", " ")
     assert max(map(len, done.stdout.splitlines())) <= 80
+    assert "Hypotheses that remained" not in done.stdout  # nothing was found
     assert not list((tmp_path / "out").glob("*.param*"))
 
 
 def test_info_says_it_on_top(turned, tmp_path):
     done = run("info", str(turned), cwd=tmp_path)
-    assert done.stdout.splitlines()[1].startswith("Why it drifted: The flow sensor's axes")
+    assert done.stdout.splitlines()[1].startswith("A cause of drift: The flow sensor's axes")
     facts = json.loads(run("info", str(turned), "--json", cwd=tmp_path).stdout)
     assert facts["causes"][0] == "flow_axes"
 
@@ -62,7 +63,7 @@ def test_info_says_it_on_top(turned, tmp_path):
 def test_the_page_of_a_log_says_it_on_top(turned, tmp_path):
     run("replay", str(turned), "--out", "r.fnr", cwd=tmp_path)
     page = render(flownav.load(tmp_path / "r.fnr"))
-    assert page.index("Why it drifted:") < page.index("<h2>Accuracy</h2>")
+    assert page.index("A cause of drift:") < page.index("<h2>Accuracy</h2>")
     assert 'id="explained"' in page
 
 

@@ -11,9 +11,10 @@ import typer
 from typer.testing import CliRunner
 
 from command import printed
-from flownav.cli.replay import command
+from flownav.cli.replay import command, error_lines
 from flownav.core.errors import InputError
 from flownav.core.record import POSITION_NED, QUATERNION, Record
+from flownav.scoring.headline import WITH_GPS
 from replay_logs import log_of_flight, write_table
 
 
@@ -233,3 +234,12 @@ def test_a_folder_without_attitude_is_replayed_by_its_imu(tmp_path):
     assert facts["outages"][0]["horizontal_rms_m"] < 0.1
     assert facts["velocity_rms_m_s"] < 0.05
     assert facts["warnings"] == []
+
+
+@pytest.mark.parametrize(("sensors", "explained"), [(("flow_rate", "gps_position"), 1), (("flow_rate",), 0)])
+def test_errors_against_a_truth_are_explained_where_gps_shares_them(sensors, explained):
+    truth = {"reference": "the simulator", "yaw_rad": None, "horizontal_rms_m": 0.7, "horizontal_max_m": 1.3,
+             "velocity_rms_m_s": 0.1}  # fmt: skip
+    scores = {"velocity_rms_m_s": None, "end_drift_m": 1.6, "protection": None, "coverage": dict.fromkeys(sensors)}
+    assert error_lines(scores | {"truth": truth}).count(f"{WITH_GPS} (--gps-outage)") == explained
+    assert WITH_GPS not in " ".join(error_lines(scores | {"end_drift_m": None}))

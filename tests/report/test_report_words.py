@@ -9,10 +9,11 @@ import pytest
 
 from flownav.core.measurement import Sensor
 from flownav.core.record import Record
-from flownav.report.content import tiles, title
+from flownav.report.content import summary, tiles, title
 from flownav.report.html import flight_facts
 from flownav.report.path_picture import path_picture
 from flownav.report.series import first_fused_s, is_north_known
+from flownav.scoring.headline import WITH_GPS
 from report_records import replay
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -75,3 +76,13 @@ def test_the_largest_error_is_named_as_of_before_the_first_range(error_m, said):
     assert first_fused_s(record, Sensor.PAD) is None
     tile = next(tile for tile in tiles(record) if tile.label == "Largest error of one axis")
     assert tile.note == f"of the autopilot's input: {said}"
+
+
+@pytest.mark.parametrize(("sensors", "explained"), [(("flow_rate", "gps_position"), True), (("flow_rate",), False)])
+def test_errors_against_a_truth_are_explained_where_gps_shares_them(sensors, explained):
+    truth = {"horizontal_rms_m": 0.7, "horizontal_max_m": 1.3}
+    scores = {"truth": truth, "end_drift_m": 1.6, "coverage": dict.fromkeys(sensors)}
+    said = summary(Record({"kind": "replay", "duration_s": 100.0, "scores": scores}))
+    assert (f"m apart. {WITH_GPS}." in said.replace("\N{NO-BREAK SPACE}", " ")) == explained
+    untrue = Record({"kind": "replay", "duration_s": 100.0, "scores": scores | {"truth": None}})
+    assert WITH_GPS not in summary(untrue)

@@ -7,7 +7,7 @@ import typer
 
 from flownav.cli import options
 from flownav.cli.options import named, option
-from flownav.cli.output import Column, answer, emit, progress, require_between, say, table_of
+from flownav.cli.output import Column, answer, emit, require_between, say, stages, table_of
 
 WIDE = 144  # columns of the table
 COMPILED = "what is measured, once, about 2 minutes in all"
@@ -26,14 +26,15 @@ def command(
 ) -> None:
     """Measure flights on both filters, lanes, the filters' steps, replay, start-up, compile time and memory."""
     from flownav.core.compile import announce_compilation
-    from flownav.studies.benchmark.measures import MEASUREMENTS, measure_all
+    from flownav.studies.benchmark.measures import measurements
 
     require_between("--flights", flights, 16, 1_000_000)
     figures = []
-    with announce_compilation("bench", COMPILED), progress("Measuring", MEASUREMENTS) as advance:
-        for measured in measure_all(flights):
-            figures += measured
-            advance(1)
+    asked = measurements(flights)
+    with announce_compilation("bench", COMPILED), stages("Measuring", len(asked)) as begin:
+        for name, measured in asked:
+            begin(name)
+            figures += measured()
     rows = [{**figure.__dict__, "reached": figure.reached} for figure in figures]
     shown = table_of(COLUMNS, rows, title="flownav on this machine", title_justify="left")
     shown.columns[1].justify = shown.columns[2].justify = "right"

@@ -177,7 +177,20 @@ def _say_plan(asked: Requirement, as_json: bool) -> None:
     ]
     plan = {"requirement": asked.name, "flights": asked.flights(), "requirements": rows}
     words = f"{asked.name}: {asked.flights()} flights"
-    answer(plan, as_json, lambda: say(words, table_of(PLAN, rows, left=1), wide=WIDE))
+    answer(plan, as_json, lambda: say(words, table_of(PLAN, rows, left=1), *_more_allowed(asked), wide=WIDE))
+
+
+def _more_allowed(asked: Requirement) -> list[str]:
+    """How many failures the requirements may have that need fewer flights than all, of which each is judged."""
+    from flownav.campaigns.requirement import needed_by
+    from flownav.campaigns.tolerance import allowed
+
+    flights = asked.flights()
+    return [
+        f"{table.sentence()}: of all {flights} flights {allowed(flights, table.probability, table.confidence)} may fail"
+        for table in asked.requirement
+        if needed_by(table) < flights
+    ]
 
 
 INPUTS_RANKED = 5  # inputs that are printed
@@ -192,7 +205,7 @@ def show(facts: dict[str, Any]) -> None:
     """Verdict, figures, envelope in a line, ranking, files."""
     judged = facts["requirement"]["requirements"]
     say(f"{facts['verdict'].upper()}  {facts['requirement']['name']}", table_of(JUDGED, judged, left=1), wide=WIDE)
-    lines = [one["more"] for one in judged if one["more"]]
+    lines = [f"{one['words']}: {one['more']}" for one in judged if one["more"]]
     fields, cells = facts["envelope"]["bins"], facts["envelope"]["cells"]
     if fields:
         counts = [(sum(field["verdict"] == name for field in fields), name) for name in ("pass", "not shown", "fail")]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from flownav.cli import options
 from flownav.cli.options import chosen, out_option
-from flownav.cli.output import Column, answer, place, say, say_files, table_of, writing
+from flownav.cli.output import Column, answer, by_reason, place, say, say_files, table_of, writing
 from flownav.core.errors import VerdictError
 from flownav.core.guard import write_text
 
@@ -32,7 +32,7 @@ LEAST_LIKELY = 0.1
 def _explains(row: dict[str, Any]) -> str:
     """The share that a trial explains, or that the sign is another cause's consequence."""
     if row["consequence_of"]:
-        return f"follows from {row['consequence_of']}"
+        return f"follows from {row['consequence_of'].replace('_', ' ')}"
     return "" if row["explained"] is None else f"{100.0 * row['explained']:.0f} %"
 
 
@@ -94,8 +94,9 @@ def _show(found: dict[str, Any]) -> None:
     likely = [row for row in found["checked"] if row["probability"] >= LEAST_LIKELY]
     if likely:
         likely.sort(key=lambda row: (bool(row["consequence_of"]), -row["probability"]))
-        say(table_of(TRIED, likely, left=1, title="Hypotheses that remained"))
+        title = "Hypotheses that remained" if found["causes"] else "Possible, but not likely enough to be named"
+        say(table_of(TRIED, likely, left=1, title=title))
     say(f"Looked for: {', '.join(row['cause'].replace('_', ' ') for row in found['checked'])}.")
-    for row in found["missing"]:
-        say(f"Not looked into, {row['cause'].replace('_', ' ')}: {row['what']}.")
+    missing = by_reason((row["cause"].replace("_", " "), row["what"]) for row in found["missing"])
+    say(*(f"Not looked into, {causes}: {what}." for causes, what in missing))
     say_files(found, ("page", "parameters"))

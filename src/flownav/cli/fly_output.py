@@ -9,7 +9,7 @@ from flownav.cli.output import figure, plain_look, say, table
 from flownav.core.text import interval_words
 from flownav.scoring.headline import sentence
 
-WIDE = 80  # columns that one flight beside a published table takes
+WIDE = NARROW = 80  # columns of a terminal, and those that one flight beside a published table takes
 WIDEST = 104  # columns that the medians and percentiles of many flights take, beside a published table
 STATISTICS, PRINTED = ("mean", "std", "rms", "max"), ("mean", "std")
 FLIGHTS_FOR_R95 = 20  # of fewer the radius would be that of the largest
@@ -63,8 +63,14 @@ def show(facts: dict[str, Any], manifest: Mapping[str, Any], median: int) -> Non
     if "paper_percentile" in facts:
         say(_percentiles(facts["paper_percentile"]))
     which = f" (flight {median}, the one with the median largest error)" if many else ""
-    page = f"   report  {facts['report']}" if "report" in facts else ""
-    say(f"record  {facts['record']}{which}{page}", soft=True)
+    say(*file_lines(facts, which), soft=True)
+
+
+def file_lines(facts: Mapping[str, Any], which: str = "") -> list[str]:
+    """Where record and report lie, in one line of a terminal where both fit. which: words on the record's flight."""
+    files = [f"record  {facts['record']}{which}", *([f"report  {facts['report']}"] if "report" in facts else [])]
+    together = "   ".join(files)
+    return [together] if len(together) <= NARROW else files
 
 
 def receiver(facts: Mapping[str, Any]) -> str:
@@ -129,7 +135,7 @@ def _many_lines(landing: dict[str, Any], flights: int) -> list[str]:
             ends = interval_words(*group["r95_interval_m"])
             lines.append(f"95 % of the flights, {name}  within {group['r95_m']:.3f} m (95 % interval {ends})")
     limited = landing["limited_by"]
-    if limited is not None:
+    if limited is not None and flights >= FLIGHTS_FOR_R95:
         parts = [f"{words} {figure(limited[f'{name}_m'], '.3f')} m" for name, words in PARTS.items()]
         lines.append(f"parts of the distance (they add as vectors), in 95 % of the flights at most  {', '.join(parts)}")
     return lines

@@ -9,7 +9,7 @@ import typer
 
 from flownav.cli import options
 from flownav.cli.options import chosen, named, numbers, option, out_option
-from flownav.cli.output import Column, answer, place, say, say_files, table, table_of
+from flownav.cli.output import Column, answer, by_reason, place, say, say_files, table, table_of
 from flownav.core.errors import InputError
 from flownav.core.text import number
 
@@ -108,7 +108,7 @@ def show(findings: Findings, facts: dict[str, Any]) -> None:
         f"power {_interval(noise.exponent, 1.0, 2)} from {noise.low_m:.2f} to {noise.high_m:.2f} m",
         table_of(SCHEDULES, findings.noise.schedules, title="Schedules of the variance (best first)"),
         *(f"Note: {note}" for note in findings.notes),
-        *(f"Not written: {name}; {why}" for name, why in facts.get("left_out", {}).items()),
+        *(f"Not written: {names}; {why}" for names, why in by_reason(facts.get("left_out", {}).items())),
         *(f"Cut to its range: {name}; {needed:.4g} is needed" for name, needed in facts.get("cut", {}).items()),
     )
     say_files(facts, ("sensor", "parameters"))

@@ -10,6 +10,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -21,6 +22,7 @@ from flownav.core.text import interval_words
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.progress import Progress
     from rich.table import Table
 
     from flownav.core.record import Record
@@ -29,13 +31,26 @@ if TYPE_CHECKING:
 @contextmanager
 def progress(what: str, total: int) -> Iterator[Callable[[int], None]]:
     """A progress bar on standard error; the value is called with how many more are done."""
+    with _bar() as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda done: bar.advance(task, done)
+
+
+@contextmanager
+def stages(what: str, total: int) -> Iterator[Callable[[str], None]]:
+    """A progress bar over stages on standard error; the value is called with the name of each as it begins."""
+    begun = count()
+    with _bar() as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda name: bar.update(task, completed=next(begun), description=f"{what} {name}")
+
+
+def _bar() -> Progress:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what, total=total)
-        yield lambda done: bar.advance(task, done)
+    columns = (TextColumn("{task.description}"), BarColumn(20), MofNCompleteColumn(), TimeRemainingColumn())
+    return Progress(*columns, console=Console(stderr=True), transient=True)
 
 
 def emit(facts: Mapping[str, Any], schema: int = 1) -> None:
@@ -276,6 +291,14 @@ def _with_columns(made: Table, chosen: list[int], title: Any = None) -> Table:
     for row in zip(*(made.columns[k].cells for k in chosen), strict=True):
         part.add_row(*row)
     return part
+
+
+def by_reason(pairs: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
+    """The names that share a reason in one text, and the reason, from pairs of a name and its reason."""
+    names: dict[str, list[str]] = {}
+    for name, why in pairs:
+        names.setdefault(why, []).append(name)
+    return [(", ".join(shared), why) for why, shared in names.items()]
 
 
 def say_files(written: Mapping[str, Any], names: Iterable[str]) -> None:

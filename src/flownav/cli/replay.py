@@ -146,6 +146,8 @@ def show(record: Record, scores: dict[str, Any], *, verbose: bool = False) -> No
 
 def error_lines(scores: dict[str, Any]) -> list[str]:
     """The errors against each reference that there is, a sentence a line."""
+    from flownav.scoring.headline import WITH_GPS
+
     sentences, truth = [], scores.get("truth")
     if "outage_median_rms_m" in scores:
         median, worst = figure(scores["outage_median_rms_m"]), figure(scores["outage_worst_rms_m"])
@@ -161,6 +163,8 @@ def error_lines(scores: dict[str, Any]) -> list[str]:
     if scores["end_drift_m"] is not None:
         laid = f"{scores['truth']['reference']} laid on it at take-off"
         sentences.append(f"At the end of the flight, {laid}: {scores['end_drift_m']:.2f} m off")
+    if truth and "gps_position" in scores["coverage"]:
+        sentences.append(f"{WITH_GPS} (--gps-outage)")
     if scores["protection"]:
         sentences.append(_protection(scores["protection"]))
     if "smoothed" in scores:
@@ -280,7 +284,7 @@ def _print(facts: dict[str, Any]) -> None:
 
     say(f"{facts['log']}: {facts['end_s'] - facts['start_s']:.1f} s")
     say(
-        f"Why it drifted: {facts['explained']}" if facts["causes"] else facts["explained"],
+        f"A cause of drift: {facts['explained']}" if facts["causes"] else facts["explained"],
         f"Verdict: {facts['verdict']}",
     )
     say(*(f"Cannot be replayed: {obstacle}" for obstacle in facts["obstacles"]))

@@ -13,7 +13,7 @@ from flownav.core.record import POSITION_NED, Record, mapping
 from flownav.report import series
 from flownav.report.panels import NONE, Part, Tile, metres, number
 from flownav.report.series import has, readings
-from flownav.scoring.headline import sentence
+from flownav.scoring.headline import WITH_GPS, sentence
 
 UNIT_AFTER_NUMBER = re.compile(r"(\d) (m/s|m|s)\b")
 SETTLES_S = 1.0  # after the first range, until the height follows it
@@ -76,6 +76,8 @@ def summary(record: Record) -> str:
         )
     if scores.get("end_drift_m") is not None:
         sentences.append(f"Laid on each other at take-off, the two end {metres(scores['end_drift_m'])} m apart.")
+    if truth and "gps_position" in mapping(scores.get("coverage")):
+        sentences.append(f"{WITH_GPS}.")
     own = mapping(scores.get("autopilot"))
     if own.get("against"):
         rms, largest = number(own.get("horizontal_rms_m"), 2), number(own.get("horizontal_max_m"), 2)

@@ -6,6 +6,10 @@ from typing import Any
 from flownav.core.record import mapping
 from flownav.scoring.landings import BESIDE_PAD, NEVER_LANDED, WENT_AROUND
 
+WITH_GPS = (  # beside errors against a truth, of an estimate that follows GPS
+    "With GPS these show how far the receiver's own slow error carried the estimate, not what flow is worth: that is "
+    "the drift while GPS is cut"
+)
 HOW = {"landed": "Landed", BESIDE_PAD: "Landed beside the pad,"}  # the outcomes of a flight that came to rest
 
 

@@ -81,14 +81,17 @@ class Judgement(NamedTuple):
             return "No number of flights shows it: its opposite is shown."
         enough = needed_by(table, self.failures)
         statement = (
-            f"{self.failures} failures in {self.flights} flights show neither. A plan that allows {self.failures} "
-            f"failures needs {enough} flights"
+            f"{self.failures} failures in {self.flights} flights show neither that it is met nor that it is missed. "
+            f"A plan that allows {self.failures} failures needs {enough} flights"
         )
+        if not self.failures:
+            return f"{statement}."
         serves = flights_to_show(rate, table.probability, table.confidence)
         if serves is None:
             return f"{statement}; at the share of failures found, {100.0 * rate:.3g} %, no plan is likely to pass."
         return (
-            f"{statement}; at the share of failures found, {100.0 * rate:.3g} %, one of {serves} passes 9 times in 10."
+            f"{statement}; at the share of failures found, {100.0 * rate:.3g} %, a plan of {serves} flights passes "
+            "9 times in 10."
         )
 
 

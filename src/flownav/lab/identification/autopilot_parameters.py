@@ -33,7 +33,7 @@ LEAST_NOISE_RAD_S = 0.05  # the floor of both autopilots
 EKF3_AVERAGING_MS = 50.0  # half of EKF3's flowTimeDeltaAvg_ms, which it subtracts beside EK3_FLOW_DELAY
 DELAYS = {"px4": "EKF2_OF_DELAY", "ardupilot": "EK3_FLOW_DELAY"}
 LIMITS = ("SENS_FLOW_MINHGT", "SENS_FLOW_MAXHGT", "SENS_FLOW_MAXR")
-NO_DATASHEET = "one log does not tell a sensor's limits; its datasheet does, given as the base"
+NO_DATASHEET = "a log does not show a sensor's limits; give a file with its datasheet as the base (--base)"
 
 
 def parameters(autopilot: str, findings: Findings) -> list[Parameter]:

@@ -147,10 +147,22 @@ class Look(NamedTuple):
     def differences(self) -> str:
         """Differences that remain between the two although they are alike, in words; "" where they are small."""
         more, ahead = self.scale - 1.0, self.lag_s
-        found = [f"the flow reads {100 * abs(more):.0f} % too {'much' if more > 0 else 'little'}"] * (abs(more) > OFF)
-        late = ahead < -APART_S or ahead > LATEST_S
-        found += [f"it lies {abs(ahead):.2f} s {'ahead of' if ahead > 0 else 'behind'} {self.against}"] * late
+        found = [f"the flow reads {100 * abs(more):.0f} % too {'much' if more > 0 else 'little'}"] * self._off_in_size
+        who = "it" if found else "the flow"
+        found += [f"{who} lies {abs(ahead):.2f} s {'ahead of' if ahead > 0 else 'behind'} {self.against}"] * self._late
         return " and ".join(found)
+
+    @property
+    def _off_in_size(self) -> bool:
+        return abs(self.scale - 1.0) > OFF
+
+    @property
+    def _late(self) -> bool:
+        return self.lag_s < -APART_S or self.lag_s > LATEST_S
+
+    def _where(self) -> str:
+        """In what the two differ: size, time, or both."""
+        return " and ".join(["size"] * self._off_in_size + ["time"] * self._late)
 
     @property
     def agrees(self) -> bool:
@@ -169,7 +181,7 @@ class Look(NamedTuple):
             return f"flow and {self.against} do not agree: their velocities' correlation is {self.correlation:.2f}"
         agree = "agree" if self.correlation >= AGREE else f"agree in part (correlation {self.correlation:.2f})"
         if differ := self.differences():
-            agree, figures = f"{agree} in shape, not in size and time", f"{differ} ({figures})"
+            agree, figures = f"{agree} in shape, not in {self._where()}", f"{differ} ({figures})"
             if not ALIKE_WITHIN[0] <= self.scale <= ALIKE_WITHIN[1]:
                 alike = f"alike in shape (correlation {self.correlation:.2f})"
                 agree, figures = "do not agree in size", f"{alike}, {figures}"

@@ -22,22 +22,21 @@ PART_STEPS, PART_ROUNDS = 1000, 50
 NAVIGATORS_SHARE = 4  # the navigator's batch is smaller by this factor
 
 
-def measure_all(flights: int) -> Iterator[list[Figure]]:
-    """Every figure, a few at a time; `flights` is the size of the batch. There are MEASUREMENTS of them."""
+def measurements(flights: int) -> list[tuple[str, Callable[[], list[Figure]]]]:
+    """The measurements in order, each with its name in words; `flights` is the size of the batch."""
     paper, navigated = _landing("paper"), _landing("landing")
-    yield single_flights(paper, navigated)
-    yield batches(paper, navigated, flights)
-    yield lanes_against_scalar(paper, navigated)
-    yield vehicles(flights)
-    yield filter_parts()
-    yield [filter_step(), *filter_against_filterpy()]
-    yield list(replay_of_recorded_flight())
-    yield [help_time()]
-    yield cold_compiles()
-    yield campaigns(flights)
-
-
-MEASUREMENTS = 10
+    return [
+        ("single flights", lambda: single_flights(paper, navigated)),
+        ("batches of flights", lambda: batches(paper, navigated, flights)),
+        ("lanes against single flights", lambda: lanes_against_scalar(paper, navigated)),
+        ("vehicles", lambda: vehicles(flights)),
+        ("parts of the filter", filter_parts),
+        ("steps of the filter", lambda: [filter_step(), *filter_against_filterpy()]),
+        ("a replay", lambda: list(replay_of_recorded_flight())),
+        ("help", lambda: [help_time()]),
+        ("compilation into an empty cache", cold_compiles),
+        ("campaigns", lambda: campaigns(flights)),
+    ]
 
 
 def _landing(name: Literal["paper", "landing"]) -> Flight:

@@ -7,7 +7,7 @@ RUN apt-get update && apt-get install --yes --no-install-recommends chromium git
 
 FROM python:3.11-slim
 COPY . /flownav
-RUN python -m pip install --no-cache-dir --constraint /flownav/constraints.txt "/flownav[live,mcap,pictures,plots]"
+RUN python -m pip install --no-cache-dir --constraint /flownav/constraints.txt "/flownav[compile,live,mcap,pictures,plots]"
 RUN mkdir /work && useradd --create-home --uid 1000 pilot && chown pilot /work
 USER pilot
 WORKDIR /work

@@ -79,7 +79,7 @@ report-size: $(VENV)/.ready-test
 
 install-size:
 	rm -rf out/installed && $(PYTHON) -m venv out/installed
-	out/installed/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt .
+	out/installed/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt $(or $(WHEEL),.)
 	out/installed/bin/python tools/install_size.py out/installed/lib/python3*/site-packages
 
 schemas: $(VENV)/.ready
@@ -125,7 +125,7 @@ $(VENV)/.python:
 
 $(VENV)/.ready: $(VENV)/.python pyproject.toml constraints.txt
 	@echo "flownav: installing libraries into $(VENV), once, about half a minute"
-	$(INSTALL:--quiet=--progress-bar off) --editable '.[plots,pictures]'
+	$(INSTALL:--quiet=--progress-bar off) --editable '.[compile,plots,pictures]'
 	@touch $@
 
 $(VENV)/.ready-%: $(VENV)/.ready

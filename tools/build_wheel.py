@@ -1,7 +1,8 @@
 """Builds a wheel that carries compiled kernels for both processor levels: `make wheel`.
 
 The commands are run at the lower level, which any machine that builds a wheel has; what they compiled is compiled for
-the higher one, and not run. Both lie in `build/kernels` before `pip wheel` packs them into `dist`.
+the higher one, and not run. Both lie in `build/kernels` before `pip wheel` packs them into `dist`, with the three C
+libraries of Numba's runtime that compiled code calls and the versions of the compilers, so that it flies without them.
 """
 
 from __future__ import annotations
@@ -12,7 +13,12 @@ import subprocess
 import sys
 import tempfile
 import time
+from importlib.machinery import EXTENSION_SUFFIXES
+from importlib.metadata import distribution
 from pathlib import Path
+
+from flownav.core.compiling.cache import COMPILERS, compilers
+from flownav.core.compiling.loaded import LIBRARIES, RUNTIME_FOLDER
 
 PROJECT = Path(__file__).resolve().parents[1]
 GATHERED = PROJECT / "build" / "kernels"
@@ -41,6 +47,18 @@ def gather(folder: Path) -> list[Path]:
         if {_function(path) for path in files} != of_commands:
             raise SystemExit(f"{level} has not the kernels that {RUN_AT} has")
     return [path for files in caches.values() for path in files]
+
+
+def put_runtime(folder: Path) -> None:
+    """Numba's runtime and licence (BSD, 2 clauses) into a folder of their own, and the versions of the compilers."""
+    numba = distribution("numba")
+    (folder / RUNTIME_FOLDER).mkdir()
+    for name in LIBRARIES:
+        file = Path(str(numba.locate_file(name.replace(".", "/") + EXTENSION_SUFFIXES[0])))
+        shutil.copyfile(file, folder / RUNTIME_FOLDER / file.name)
+    licence = next(file for file in numba.files or () if file.name == "LICENSE")
+    shutil.copyfile(str(numba.locate_file(licence)), folder / RUNTIME_FOLDER / "numba.LICENSE")
+    (folder / COMPILERS).write_text(compilers(), encoding="utf-8")
 
 
 def _function(kernel: Path) -> str:
@@ -73,6 +91,7 @@ def main() -> None:
         carried = [path for path in kernels if not left_out(path, Path(temporary))]
         for path in carried:
             shutil.copyfile(path, GATHERED / path.name)
+    put_runtime(GATHERED)
     pip = ("-m", "pip", "wheel", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-build-isolation")
     for old in DIST.glob("flownav-*.whl"):
         old.unlink()

@@ -7,7 +7,7 @@
 # Install flownav first, in a clone of its repository:
 #
 # ```bash
-# pip install .
+# pip install '.[compile]'
 # ```
 #
 # ## Fly

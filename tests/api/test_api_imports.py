@@ -9,8 +9,9 @@ import pytest
 
 HEAVY = ("numpy", "numba", "scipy", "pandas", "polars", "xarray", "plotly", "pyarrow", "pydantic", "typer", "rich")
 # what a command that flies, replays or shows one flight has no use for, though it is installed
-NEVER = ("numba", "pandas", "plotly", "scipy.special", "scipy.linalg", "scipy.signal", "scipy.spatial", "scipy.stats",
-         "scipy.ndimage", "scipy.optimize", "scipy.interpolate", "numpy.f2py", "PIL", "ray", "matplotlib")  # fmt: skip
+NEVER = ("numba", "llvmlite", "pandas", "plotly", "scipy.special", "scipy.linalg", "scipy.signal", "scipy.spatial",
+         "scipy.stats", "scipy.ndimage", "scipy.optimize", "scipy.interpolate", "numpy.f2py", "PIL", "ray",
+         "matplotlib")  # fmt: skip
 
 SIMULATOR = ("flownav.simulation", "flownav.campaigns", "flownav.control", "flownav.parts")
 

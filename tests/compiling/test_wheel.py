@@ -130,7 +130,7 @@ def test_the_wheel_works_in_an_empty_environment(plain_wheel, tmp_path):
     place = tmp_path / "empty"
     subprocess.run([sys.executable, "-m", "venv", str(place)], check=True)
     pip = [str(place / "bin" / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    subprocess.run([*pip, "--constraint", str(PROJECT / "constraints.txt"), str(plain_wheel)], check=True)
+    subprocess.run([*pip, "--constraint", str(PROJECT / "constraints.txt"), f"{plain_wheel}[compile]"], check=True)
     outside = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "FLOWNAV_CACHE")}
     outside |= {"FLOWNAV_CACHE": str(tmp_path / "cache"), "COLUMNS": "80"}
 

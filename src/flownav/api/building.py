@@ -6,6 +6,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from flownav.api.arguments import checked
+from flownav.core.compiling.declared import needing_compilers
 from flownav.core.errors import InputError, arg
 
 if TYPE_CHECKING:
@@ -48,8 +49,9 @@ def build(
         >>> built["target"], built["abi"], "flownav.h" in built["files"]
         ('linux-x86_64', 1, True)
     """
-    from flownav.export.onboard.package import Asked, check
-    from flownav.export.onboard.package import build as written
+    with needing_compilers():
+        from flownav.export.onboard.package import Asked, check
+        from flownav.export.onboard.package import build as written
 
     _check(horizon_s, imu_hz, others_hz)
     asked = Asked(target, cpu, features, without=tuple(without))
@@ -133,7 +135,8 @@ def verify(what: str | Path, record: str | Path | None = None, *, horizon_s: flo
         >>> flownav.verify("0123456789abcdef", log)["equal"]
         False
     """
-    from flownav.export.onboard.verify import logged_digests, verified
+    with needing_compilers():
+        from flownav.export.onboard.verify import logged_digests, verified
 
     if Path(what).is_dir():
         return _folder_verified(Path(what), record)

@@ -25,7 +25,7 @@ def provenance(inputs: Iterable[Path] = ()) -> dict[str, Any]:
     return {
         "flownav": __version__,
         "python": platform.python_version(),
-        "libraries": {name: _version(name) for name in LIBRARIES},
+        "libraries": {name: version_of(name) for name in LIBRARIES},
         "written_utc": datetime.now(UTC).isoformat(timespec="seconds"),
         "inputs": {str(file): hash_of(file) for path in inputs for file in _files(path)},
     }
@@ -71,7 +71,8 @@ def _files(path: Path) -> list[Path]:
     return sorted((f for f in path.iterdir() if f.is_file()), key=natural_order) if path.is_dir() else [path]
 
 
-def _version(name: str) -> str | None:
+def version_of(name: str) -> str | None:
+    """The version of a distribution; None where it is not installed."""
     try:
         return version(name)
     except PackageNotFoundError:

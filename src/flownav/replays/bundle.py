@@ -3,7 +3,6 @@ without one."""
 
 import platform
 from dataclasses import replace
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from flownav.core.errors import InputError
 from flownav.core.frames import rotation_from_quaternion
 from flownav.core.measurement import COLUMNS, Array, Sensor, Stream
+from flownav.core.provenance import version_of
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log, attitude_at
@@ -83,7 +83,8 @@ def _with_turning(replay: Replay, sensor: Sensor) -> Array:
 
 def _manifest(replay: Replay, scores: dict[str, Any], command: list[str] | str) -> dict[str, Any]:
     log = replay.log
-    versions = {name: version(name) for name in ("flownav", "numpy", "numba", "pyarrow")}
+    found = {name: version_of(name) for name in ("flownav", "numpy", "numba", "pyarrow")}
+    versions = {name: version for name, version in found.items() if version}
     return {
         "kind": "replay",
         "log": log.path.name,

@@ -19,7 +19,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Collection, Iterator
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -33,8 +33,20 @@ MAGIC = b"flownav kernel 1\n"
 SUFFIX = ".kernel"
 UNUSED_DAYS = 60.0
 SHIPPED = PACKAGE / "kernels"
+COMPILERS = "compilers.txt"  # beside kernels that a wheel carries: the versions that made them
+
+
+def compilers(shipped: Path = SHIPPED) -> str:
+    """The versions of the compilers; without them, of those that made the kernels of this wheel; "" without either."""
+    try:
+        return f"numba {version('numba')}, llvmlite {version('llvmlite')}"
+    except PackageNotFoundError:
+        made_by = shipped / COMPILERS
+        return made_by.read_text(encoding="utf-8") if made_by.is_file() else ""
+
+
 VERSIONS = (
-    f"numba {version('numba')}, llvmlite {version('llvmlite')}, numpy {'.'.join(np.__version__.split('.')[:2])}, "
+    f"{compilers()}, numpy {'.'.join(np.__version__.split('.')[:2])}, "
     f"{platform.python_implementation()} {sys.version_info[0]}.{sys.version_info[1]}, {sys.platform}"
 )
 

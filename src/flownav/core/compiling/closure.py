@@ -32,7 +32,7 @@ WITHOUT_CODE = {
     "flownav.core.guard",
     *(
         f"flownav.core.compiling.{part}"
-        for part in ("beside", "cache", "closure", "declared", "loaded", "progress", "words")
+        for part in ("beside", "cache", "closure", "declared", "linker", "loaded", "progress", "words")
     ),
 }
 

@@ -7,10 +7,13 @@ functions compiled by Numba itself can call equations.
 
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib import import_module
 
 EXTENSIONS = "flownav.core.compiling.extensions"  # by name: what it imports has left word here
+COMPILERS = ("numba", "llvmlite")
+NEEDED = "this needs code that is not compiled yet, and so Numba: pip install 'flownav[compile]'"
 _lock = threading.RLock()
 _waiting: list[Callable[[], object]] = []
 _begun = False
@@ -31,9 +34,25 @@ def begin_compiling() -> None:
     global _begun
     with _lock:
         if not _begun:
-            _begun = True
-            import_module(EXTENSIONS)
+            with needing_compilers():
+                _begun = True
+                import_module(EXTENSIONS)
         _declare()
+
+
+@contextmanager
+def needing_compilers() -> Iterator[None]:
+    """A block that imports the compiler. InputError where that is not installed, as beside kernels of a wheel."""
+    global _begun
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] not in COMPILERS:
+            raise
+        from flownav.core.errors import InputError
+
+        _begun = False
+        raise InputError(NEEDED) from None
 
 
 def _declare() -> None:

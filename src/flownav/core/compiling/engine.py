@@ -69,7 +69,7 @@ def _defer(module: str, how: str, *details: Any) -> None:
 
 
 def compiler() -> Any:
-    """The module that has Numba, with every equation declared."""
+    """The module that has Numba, with every equation declared. InputError where Numba is not installed."""
     begin_compiling()
     return import_module("flownav.core.compiling.compiler")
 

@@ -1,9 +1,11 @@
-"""Machine code that was kept, run without the compiler: LLVM links it to Numba's runtime, three small C libraries.
+"""Machine code that was kept, run without the compiler: placed into memory beside Numba's runtime, three small C
+libraries.
 
 `import numba` takes a third of a second, and declaring all equations to it as long again; this takes a twentieth of
-one. The C libraries (what takes an array out of a Python object, what raises an error) are loaded from Numba's folder
-under Numba's own names, so that Numba finds them should something be compiled after all. Whatever is not as this
-supposes (another version, another system) is left to Numba, which loads the same machine code.
+one. The C libraries (what takes an array out of a Python object, what raises an error) are those that a wheel with
+kernels carries, or those of Numba's folder; they are loaded under Numba's own names, so that Numba finds them should
+something be compiled after all. On x86-64 nothing of LLVM is loaded (45 MB; `linker`); elsewhere it links. Whatever is
+not as this supposes (another version, another system) is left to Numba, which loads the same machine code.
 """
 
 import builtins
@@ -20,10 +22,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from llvmlite import binding as llvm
+from flownav.core.compiling import linker
+from flownav.core.compiling.cache import SHIPPED, STORE
 
-from flownav.core.compiling.cache import STORE
-
+RUNTIME_FOLDER = "runtime"
 RUNTIME = "numba.core.runtime._nrt_python"
 LIBRARIES = ("numba._helperlib", "numba._dynfunc", RUNTIME)
 _lock = threading.RLock()
@@ -58,10 +60,9 @@ class MachineCode(NamedTuple):
 
 
 class _Runtime(NamedTuple):
-    """Numba's C libraries, the linker, and the symbols that code may ask for."""
+    """Numba's C library that makes functions, and the symbols that code may ask for."""
 
     functions: Any
-    linker: Any
     symbols: dict[str, int]
 
 
@@ -125,18 +126,38 @@ def _function(code: MachineCode) -> Callable[..., Any]:
 
 def _linked(code: MachineCode) -> tuple[int, list[Any]]:
     """The address of the entry, and the environments that it points to."""
-    _, linker, symbols = runtime()
+    try:
+        placed: Any = linker.place(code.code, runtime().symbols)
+        addresses = placed.addresses
+    except ValueError:
+        placed = addresses = _linked_by_llvm(code)
+    environments = [_environment(environment) for environment in code.environments]
+    for described, made in zip(code.environments, environments, strict=True):
+        c_void_p.from_address(addresses[described.symbol]).value = id(made)
+    _alive.append((placed, environments))
+    return int(addresses[code.entry]), environments
+
+
+def _linked_by_llvm(code: MachineCode) -> Any:
+    """The same code on a processor whose relocations `linker` does not know."""
+    from llvmlite import binding as llvm
+
     library = llvm.JITLibraryBuilder().add_object_img(code.code).add_current_process().export_symbol(code.entry)
-    for symbol, address in symbols.items():
+    for symbol, address in runtime().symbols.items():
         library.import_symbol(symbol, address)
     for environment in code.environments:
         library.export_symbol(environment.symbol)
-    linked = library.link(linker, f"flownav {len(_alive)}")
-    environments = [_environment(environment) for environment in code.environments]
-    for described, made in zip(code.environments, environments, strict=True):
-        c_void_p.from_address(linked[described.symbol]).value = id(made)
-    _alive.append((linked, environments))
-    return int(linked[code.entry]), environments
+    return library.link(_lljit(), f"flownav {len(_alive)}")
+
+
+@cache
+def _lljit() -> Any:
+    """LLVM's linker, once in a process."""
+    from llvmlite import binding as llvm
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm.create_lljit_compiler()
 
 
 def _environment(described: Environment) -> Any:
@@ -157,9 +178,7 @@ def runtime() -> _Runtime:
     symbols["numba_unpickle"] = cast(_UNPICKLE, c_void_p).value or 0
     errors = (kind for kind in vars(builtins).values() if isinstance(kind, type) and issubclass(kind, BaseException))
     symbols |= {f"PyExc_{kind.__name__}": id(kind) for kind in errors}
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-    return _Runtime(functions, llvm.create_lljit_compiler(), symbols)
+    return _Runtime(functions, symbols)
 
 
 def _library(name: str) -> ModuleType:
@@ -168,14 +187,21 @@ def _library(name: str) -> ModuleType:
         return sys.modules[name]
     if "numba" in sys.modules:
         return import_module(name)
-    package = importlib.util.find_spec("numba")
-    if package is None or package.origin is None:
-        raise ImportError("Numba is not installed")
-    folder = Path(package.origin).parent.joinpath(*name.split(".")[1:-1])
-    found = FileFinder(str(folder), (ExtensionFileLoader, EXTENSION_SUFFIXES)).find_spec(name)
+    found = next(filter(None, (_found_in(folder, name) for folder in _folders(name))), None)
     if found is None or found.loader is None:
         raise ImportError(f"{name} is not there")
     module = importlib.util.module_from_spec(found)
     found.loader.exec_module(module)
     sys.modules[name] = module
     return module
+
+
+def _folders(name: str) -> list[Path]:
+    """Where a C library of Numba's may lie: in Numba's package, or in a wheel of ours with kernels."""
+    package = importlib.util.find_spec("numba")
+    of_numba = Path(package.origin).parent.joinpath(*name.split(".")[1:-1]) if package and package.origin else None
+    return [folder for folder in (of_numba, SHIPPED / RUNTIME_FOLDER) if folder is not None]
+
+
+def _found_in(folder: Path, name: str) -> Any:
+    return FileFinder(str(folder), (ExtensionFileLoader, EXTENSION_SUFFIXES)).find_spec(name)

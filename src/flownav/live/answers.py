@@ -1,6 +1,7 @@
 """The current estimate, whether it may be sent, and the messages that go to the vehicle."""
 
 import math
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -121,9 +122,15 @@ def tilt_cosine(work: Array) -> float:
 
 def _full(triangle: Array, count: int) -> Array:
     """A symmetric matrix of its upper triangle, row by row."""
-    found = np.zeros((count, count))
-    found[np.triu_indices(count)] = triangle
-    return np.asarray(found + np.triu(found, 1).T)
+    return np.asarray(triangle[_places(count)] + 0.0)  # no zero with a sign
+
+
+@cache
+def _places(count: int) -> Array:
+    """Where each element of a symmetric matrix stands in its upper triangle, row by row; (count, count)."""
+    places = np.zeros((count, count), np.int64)
+    places[np.triu_indices(count)] = range(count * (count + 1) // 2)
+    return np.asarray(np.maximum(places, places.T))
 
 
 def quality_of(on: Running, pose: Array, velocity: Array, t_s: float, limits: Limits, base: Base = NOTHING) -> int:

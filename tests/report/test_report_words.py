@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from xml.etree import ElementTree
 
 import numpy as np
@@ -9,11 +10,14 @@ import pytest
 
 from flownav.core.measurement import Sensor
 from flownav.core.record import Record
+from flownav.report import spectrum as spectra
 from flownav.report.content import summary, tiles, title
-from flownav.report.html import flight_facts
+from flownav.report.html import coded, flight_facts
+from flownav.report.landing import key_places
 from flownav.report.path_picture import path_picture
 from flownav.report.series import first_fused_s, is_north_known
 from flownav.scoring.headline import WITH_GPS
+from flownav.scoring.phases import Phase
 from report_records import replay
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -86,3 +90,43 @@ def test_errors_against_a_truth_are_explained_where_gps_shares_them(sensors, exp
     assert (f"m apart. {WITH_GPS}." in said.replace("\N{NO-BREAK SPACE}", " ")) == explained
     untrue = Record({"kind": "replay", "duration_s": 100.0, "scores": scores | {"truth": None}})
     assert WITH_GPS not in summary(untrue)
+
+
+def test_what_stands_between_backticks_is_code_and_the_rest_is_escaped():
+    assert coded("`flownav fly <a>` & on") == "<code>flownav fly &lt;a&gt;</code> &amp; on"
+
+
+def test_a_key_that_is_full_goes_on_in_a_line_below():
+    names = ["ground", "climb", "ground", "hover"]
+    assert key_places(names, 500.0) == [("ground", 0.0, 35.0), ("climb", 60.8, 35.0), ("hover", 111.3, 35.0)]
+    assert [(name, y) for name, _, y in key_places(names, 120.0)] == [
+        ("ground", 35.0),
+        ("climb", 35.0),
+        ("hover", 50.0),
+    ]
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["ground", "hover"],
+        ["ground", "climb", "descent", "transit", "approach", "outbound leg", "touchdown", "landed", "hover"],
+    ],
+)
+def test_phases_are_coloured_below_their_key(monkeypatch, names):
+    phases = [Phase(name, float(k), k + 1.0) for k, name in enumerate(names)]
+    monkeypatch.setattr("flownav.report.path_picture.phases_of", lambda record: phases)
+    _, height = (view.find(f"{SVG}g") for view in ElementTree.fromstring(path_picture(replay()).svg))
+    key = [float(one.get("y")) for one in height.iter(f"{SVG}text") if one.text in names]
+    bands = [float(one.get("y")) for one in height.iter(f"{SVG}rect") if one.get("class") == "band"]
+    assert len(set(key)) == (1 if len(names) == 2 else 2)
+    assert min(bands) >= max(key) + 15.0
+
+
+def test_the_last_frequency_is_not_cut_at_the_edge():
+    frequency = np.linspace(0.0, 50.2, 252)
+    found = {"frequency_hz": frequency.tolist()} | {key: (1.0 + frequency).tolist() for key, _, _ in spectra.ROWS}
+    (panel,) = spectra.spectrum(Record({"vibration": found}))
+    sides = {text: side for side, text in re.findall(r'text-anchor="(\w+)">(\d+(?: Hz)?)</text>', panel.drawing.svg)}
+    assert sides["50 Hz"] == "end"
+    assert sides["45"] == "middle"

@@ -16,7 +16,7 @@ from flownav.studies.explain.sign import Sign
 from flownav.studies.explain.table import BY_NAME, HYPOTHESES
 
 MEASURED = Path(__file__).parents[2] / "docs" / "explanation" / "explained.md"
-NAMES = {"px4": "PX4", "ardupilot": "ArduPilot"}
+NAMES = {"px4": "PX4", "ardupilot": "ArduPilot", "inav": "INAV"}
 # figures as a sign has them, from which the pages' parameters follow
 EXAMPLE = {
     "turn_deg": -90.0, "mirrored": "", "axes": "", "gain": 0.8, "x": 0.8, "y": 0.8, "read": "0.80 of what it should",
@@ -45,7 +45,7 @@ def index() -> str:
 
 
 def page(one: Hypothesis) -> str:
-    """The page of one cause: its look, its reason, the cure on either autopilot, and how to prevent it."""
+    """The page of one cause: its look, its reason, the cure on each autopilot, and how to prevent it."""
     told = one.words
     text = f"# {told['title']}\n\n`{one.name}`. {measured(one.name)}\n\n"
     text += f"**What it looks like.** {told['looks']}\n\n**Why.** {told['why']}\n\n"
@@ -57,6 +57,8 @@ def page(one: Hypothesis) -> str:
         if cure.settings:
             text += f"On {name}, by an example's figures:\n\n| parameter | value | because |\n|---|---|---|\n"
             text += "".join(f"| `{p.name}` | {p.text} | {p.reason} |\n" for p in cure.settings) + "\n"
+        elif dialect in told:
+            text += f"On {name}: {told[dialect]}\n\n"
         else:
             text += f"On {name} no parameter cures it.\n\n"
     text += f"{by_hand}\n\n## How to prevent it\n\n{told['prevent']}\n"
@@ -67,7 +69,7 @@ def page(one: Hypothesis) -> str:
 def example(one: Hypothesis, dialect: str) -> Cure:
     """The cure for an example's figures, of a vehicle that takes the range for its height."""
     parameters = {"px4": {"EKF2_OF_CTRL": 1.0, "EKF2_GPS_CTRL": 7.0, "EKF2_HGT_REF": 2.0},
-                  "ardupilot": {"EK3_SRC1_VELXY": 5.0, "EK3_SRC1_POSZ": 2.0}}[dialect]  # fmt: skip
+                  "ardupilot": {"EK3_SRC1_VELXY": 5.0, "EK3_SRC1_POSZ": 2.0}, "inav": {}}[dialect]  # fmt: skip
     figures = dict(EXAMPLE)
     if one.name == "compass_wrong":
         figures["turn_deg"] = 90.0
@@ -85,6 +87,6 @@ def measured(name: str) -> str:
     """How often it was named first where it was planted, from the committed table."""
     row = re.search(rf"^\| `{name}` \| (\d+) \| (\d+) \| (\d+) \|$", MEASURED.read_text(encoding="utf-8"), re.MULTILINE)
     if row is None:
-        return "It was not planted yet."
+        return "It is none of the faults that were planted."
     times = f"Planted {row[1]} times it was named first {row[2]} times, and {row[3]} times where it was not planted"
     return f"{times} ([table](../explained.md))."

@@ -12,6 +12,7 @@ from flownav.report import campaign_figures as figures
 from flownav.report import certificate_figures, tables
 from flownav.report.campaign_figures import Touchdowns
 from flownav.report.cloud_picture import cloud_picture
+from flownav.report.content import in_words
 from flownav.report.html import HERE, drawn_with, page_of, template, widened
 from flownav.report.panels import NONE, Panel, Section, number
 
@@ -45,7 +46,7 @@ def render(summary: dict[str, Any], touchdowns: Sequence[Touchdowns], kept: Sequ
     page: str = template("campaign.html.j2").render(
         picture=picture and Markup(picture.svg),
         picture_words=picture.words if picture else "",
-        title=", ".join(summary["scenarios"]),
+        title=", ".join(in_words(name) for name in summary["scenarios"]),
         facts=facts(summary),
         sentence=sentence(summary["cells"][0]),
         headings=headings(summary),

@@ -30,8 +30,12 @@ def title(record: Record) -> str:
     scenario, log = record.manifest.get("scenario"), record.manifest.get("log")
     if log and not scenario:
         return PurePath(str(log)).name or "Flight"
-    name = scenario or record.manifest.get("kind") or "Flight"
-    words = PurePath(str(name)).name.removesuffix(".toml").replace("_", " ").replace("-", " ").strip() or "Flight"
+    return in_words(str(scenario or record.manifest.get("kind") or "Flight"))
+
+
+def in_words(name: str) -> str:
+    """A scenario's name, or its file's, as a heading."""
+    words = PurePath(name).name.removesuffix(".toml").replace("_", " ").replace("-", " ").strip() or "Flight"
     return words[0].upper() + words[1:]
 
 

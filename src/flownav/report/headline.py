@@ -52,7 +52,7 @@ def flown_with(record: Record) -> str:
     """How it was flown or fused, as one sentence."""
     manifest = record.manifest
     if manifest.get("kind") != "fly":
-        return f"Fused by the filter {manifest['filter']}." if manifest.get("filter") else ""
+        return f"Fused by flownav's filter of the kind {manifest['filter']}." if manifest.get("filter") else ""
     parts = ["Simulated"]
     if manifest.get("truth"):
         model = {"matched": "as the navigator believes it to be", "dispersed": "other than the navigator believes"}

@@ -20,6 +20,8 @@ from flownav.report.style import FONT, PALETTE
 LOOP_S, CLOSE_S = 5.0, 3.0
 HIGH_PX, SIDE_PX, ABOVE_PX, CLOSE_PX, GAP_PX, MARGIN_PX = 360, 380, 360, 300, 20, 14
 ROUND_M = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
+KEY_PX, KEY_LINE_PX = 35.0, 15.0  # of a key's first line, and to the next
+WIDE_LETTER_PX, NARROWER_PX = 7.3, 3.0  # of a key's letters in the widest of the page's fonts
 WIDEST_PX = 0.4 * HIGH_PX  # a tube that is wider would only tint the picture
 TUBE_ELLIPSES = 60  # that a tube of 3 sigma is made of
 ROLES: tuple[str, ...] = ("surface", "ink", "muted", "rule", "truth", "flown", "alert", "pad", "padfill", "gps", "flow")
@@ -195,21 +197,27 @@ def _tube(way: Array, radii: Array) -> str:
 def _phase_key(s: Scene) -> str:
     """The colours of the phases that the picture shows, over it."""
     t0, t1 = s.ways[0].t_s[0], s.ways[0].t_s[-1]
-    return phase_key([phase.name for phase in s.phases if phase.t0 < t1 and phase.t1 > t0], 0.0, SIDE_PX)
+    return phase_key([phase.name for phase in s.phases if phase.t0 < t1 and phase.t1 > t0], SIDE_PX)
 
 
-def phase_key(names: Sequence[str], left: float, right: float) -> str:
-    """The phases' colours and names, each once, between two places [px]; on a second line where the first is full."""
-    x, y, parts = left, 35.0, []
+def phase_key(names: Sequence[str], right: float) -> str:
+    """The phases' colours and names, each once; what goes beyond `right` [px] stands on a second line."""
+    return "".join(
+        f'<rect x="{x:.0f}" y="{y - 9:.0f}" width="10" height="10" rx="2" '
+        f'style="fill:var(--phase-{escape(name)})"/><text x="{x + 13:.0f}" y="{y:.0f}">{escape(name)}</text>'
+        for name, x, y in key_places(names, right)
+    )
+
+
+def key_places(names: Sequence[str], right: float) -> list[tuple[str, float, float]]:
+    """Each name once, and where it stands [px]."""
+    x, y, places = 0.0, KEY_PX, []
     for name in dict.fromkeys(names):
-        wide = 20.0 + 6.9 * len(name)
-        x, y = (left, y + 15.0) if x + wide > right else (x, y)
-        parts.append(
-            f'<rect x="{x:.0f}" y="{y - 9:.0f}" width="10" height="10" rx="2" '
-            f'style="fill:var(--phase-{escape(name)})"/><text x="{x + 13:.0f}" y="{y:.0f}">{escape(name)}</text>'
-        )
+        wide = 20.0 + WIDE_LETTER_PX * len(name) - NARROWER_PX * sum(letter in "fijlrt" for letter in name)
+        x, y = (0.0, y + KEY_LINE_PX) if x + wide > right else (x, y)
+        places.append((name, x, y))
         x += wide
-    return "".join(parts)
+    return places
 
 
 def _lines(truth: Array, estimated: Array) -> str:

@@ -13,10 +13,12 @@ from flownav.core.record import Record
 from flownav.report.figures_states import Paths, paths_of
 from flownav.report.landing import (
     HIGH_PX,
+    KEY_PX,
     ROUND_M,
     Picture,
     animated,
     dots,
+    key_places,
     phase_key,
     polyline,
     scale_bar,
@@ -98,14 +100,16 @@ def _height(shown: list[tuple[str, str, Track]], main: Track, phases: list[Phase
     """Height over time, on the colours of the phases."""
     heights = np.concatenate([-path.value[:, 2] for _, _, path in shown])
     low, high = float(min(heights.min(), 0.0)), float(max(heights.max(), 1.0))
-    top, bottom, left = 60.0, HIGH_PX - 34.0, 34.0
+    names = [phase.name for phase in phases if phase.t0 < window[1] and phase.t1 > window[0]]
+    above = KEY_PX + 15.0 + max((y - KEY_PX for _, _, y in key_places(names, HEIGHT_PX)), default=0.0)
+    top, bottom, left = above + 10.0, HIGH_PX - 34.0, 34.0
     across, up = (HEIGHT_PX - left - 8.0) / (window[1] - window[0]), (bottom - top) / (high - low)
 
     def placed(path: Track) -> Array:
         return np.column_stack([left + across * (path.t_s - window[0]), bottom + up * (path.value[:, 2] + low)])
 
-    bands = "".join(_band(phase, window, left, across, bottom) for phase in phases)
-    key = phase_key([phase.name for phase in phases if phase.t0 < window[1] and phase.t1 > window[0]], left, HEIGHT_PX)
+    bands = "".join(_band(phase, window, left, across, (above, bottom + 6.0)) for phase in phases)
+    key = phase_key(names, HEIGHT_PX)
     step = next((size for size in (*ROUND_M, *FAR_M) if up * size >= 50.0), FAR_M[-1])
     marks = 0.0 + np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step
     ticks = "".join(
@@ -128,13 +132,14 @@ def _drawn(role: str, way: Array) -> str:
     return (dots if role == "gps" else polyline)(f"way of-{role}", way)
 
 
-def _band(phase: Phase, window: Window, left: float, across: float, bottom: float) -> str:
+def _band(phase: Phase, window: Window, left: float, across: float, span_px: Window) -> str:
     t0, t1 = max(phase.t0, window[0]), min(phase.t1, window[1])
     if t1 <= t0:
         return ""
     colour = f'style="fill:var(--phase-{escape(phase.name)})"'
     x, wide = left + across * (t0 - window[0]), across * (t1 - t0)
-    return f'<rect class="band" {colour} x="{x:.1f}" y="50" width="{wide:.1f}" height="{bottom - 44:.1f}"/>'
+    high = span_px[1] - span_px[0]
+    return f'<rect class="band" {colour} x="{x:.1f}" y="{span_px[0]:.0f}" width="{wide:.1f}" height="{high:.1f}"/>'
 
 
 def _ends(path: Track) -> Window:

@@ -12,6 +12,7 @@ from flownav.report.series import track
 from flownav.scoring.vibration import spectrum_of
 
 WIDE_PX, HIGH_PX, LEFT_PX, GAP_PX = 1080, 150, 58, 24
+LABEL_PX = 24  # from the edge, within which a label in the middle of its mark would be cut
 MOTION_HZ = 5.0  # of a vehicle that flies; what is faster is vibration
 ROWS = (("accel_m_s2_rt_hz", "accelerometer (m/s²/√Hz)", "m/s²"), ("gyro_deg_s_rt_hz", "gyro (°/s/√Hz)", "°/s"))
 
@@ -64,6 +65,10 @@ def _row(place: int, title: str, frequency: Array, values: Array) -> str:
     def up(value: Array | float) -> Any:
         return top + HIGH_PX - 20 - (HIGH_PX - 20) * np.clip((np.log10(value) - low) / (high - low), 0.0, 1.0)
 
+    def anchored(hz: float) -> str:
+        side = "end" if across(hz) > WIDE_PX - LABEL_PX else "middle"
+        return f'text-anchor="{side}"'
+
     decades = "".join(
         f'<line x1="{LEFT_PX}" x2="{right}" y1="{up(10.0**k):.1f}" y2="{up(10.0**k):.1f}"/>'
         f'<text x="{LEFT_PX - 6}" y="{up(10.0**k) + 4:.1f}" text-anchor="end">{10.0**k:g}</text>'
@@ -72,7 +77,7 @@ def _row(place: int, title: str, frequency: Array, values: Array) -> str:
     step = next(one for one in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 10**9) if frequency[-1] / one <= 12)
     marks = "".join(
         f'<line x1="{across(hz):.1f}" x2="{across(hz):.1f}" y1="{top}" y2="{up(10.0**low):.1f}"/>'
-        f'<text x="{across(hz):.1f}" y="{up(10.0**low) + 16:.1f}" text-anchor="middle">{number(float(hz), 0)}'
+        f'<text x="{across(hz):.1f}" y="{up(10.0**low) + 16:.1f}" {anchored(hz)}>{number(float(hz), 0)}'
         f"{' Hz' if hz + step > frequency[-1] else ''}</text>"
         for hz in np.arange(0.0, frequency[-1], step)
     )

@@ -28,7 +28,7 @@ class Hypothesis(NamedTuple):
 
     @property
     def words(self) -> dict[str, str]:
-        """title, sentence, looks, why, prevent."""
+        """title, sentence, looks, why, prevent; inav where INAV has a setting."""
         return words()[self.name]
 
 

@@ -73,6 +73,7 @@ def without(words: str, *sensors: Sensor) -> Repairing:
         streams = {sensor: one for sensor, one in streams.items() if len(one)}
         return Repair(streams, case.options, words, sensors)
 
+    repair.__doc__ = words  # for the page of the cause
     return repair
 
 

@@ -2,7 +2,8 @@
 
 Plotly's script, which draws the pages of campaigns, certificates and comparisons: taken, with its licence, from
 Plotly's own package, so that who installs flownav need not install that (65 MB). Compiled kernels, if `FLOWNAV_KERNELS`
-names their folder: such a wheel is for one version of Python and one kind of machine, and is named so; else for all.
+names their folder: such a wheel is for one version of Python and one kind of machine, is named so, and asks for no
+compiler. Any other is for all machines and asks for Numba, as an editable install does.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 VENDOR = "flownav/report/vendor"
 SCRIPT = "plotly/package_data/plotly.min.js"
+COMPILE = "compile"  # the extra that a wheel without kernels cannot do without
 
 
 class Carried(BuildHookInterface):
@@ -25,11 +27,14 @@ class Carried(BuildHookInterface):
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Before the files are gathered; an editable install carries none."""
+        folder = os.environ.get("FLOWNAV_KERNELS") if version == "standard" else None
+        if not folder:
+            build_data["dependencies"].extend(self.metadata.core.optional_dependencies[COMPILE])
         if version != "standard":
             return
         for source, name in _script_and_licence():
             build_data["force_include"][str(source)] = f"{VENDOR}/{name}"
-        if folder := os.environ.get("FLOWNAV_KERNELS"):
+        if folder:
             build_data["force_include"][folder] = "flownav/kernels"
             build_data["pure_python"], build_data["infer_tag"] = False, True
 

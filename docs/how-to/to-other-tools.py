@@ -32,7 +32,7 @@ for name in ("foxglove", "tum", "csv"):
 # ## In three dimensions, with Rerun
 #
 # `flownav view` opens a record in Rerun's viewer: the vehicle, the pad, the camera's view, flow vectors, the
-# covariance and both paths over time. It needs `pip install ".[compile,view]"`. With `--out` it writes a file instead,
+# covariance and both paths over time. It needs `pip install ".[view]"`. With `--out` it writes a file instead,
 # which opens on any machine that has Rerun.
 
 # %% language="bash"

@@ -7,7 +7,7 @@
 # Install flownav first, in a clone of its repository:
 #
 # ```bash
-# pip install '.[compile]'
+# pip install .
 # ```
 #
 # ## Fly

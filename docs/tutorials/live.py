@@ -5,7 +5,7 @@
 # it without a vehicle: one process plays an autopilot that tells its sensors, the other one is the navigator. They
 # talk over the loopback network of this machine, as they would over a radio or a serial cable.
 #
-# It needs pymavlink: `pip install ".[compile,live]"`.
+# It needs pymavlink: `pip install ".[live]"`.
 #
 # In practice you would use two terminals. Here the navigator runs in the background while the vehicle flies.
 #

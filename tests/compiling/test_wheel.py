@@ -99,15 +99,37 @@ for lacking in (panels.plotly, lambda: read_frames([Path("frame.png")])):
 
 
 # -- a wheel without kernels -------------------------------------------------------------------------------------
-@pytest.fixture(scope="module")
-def plain_wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel that an index would have: for all machines, without kernels. It takes a second to build."""
-    place = tmp_path_factory.mktemp("built")
-    environment = {name: value for name, value in os.environ.items() if name != "FLOWNAV_KERNELS"}
+def built(place: Path, **environment: str) -> Path:
+    """A wheel with these variables set. It takes a second to build."""
+    outside = {name: value for name, value in os.environ.items() if name != "FLOWNAV_KERNELS"} | environment
     command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(place)]
-    subprocess.run(command, cwd=PROJECT, env=environment, capture_output=True, check=True)
+    subprocess.run(command, cwd=PROJECT, env=outside, capture_output=True, check=True)
     (wheel,) = place.glob("flownav-*.whl")
     return wheel
+
+
+def required(wheel: Path) -> list[str]:
+    """The packages that it needs without any extra."""
+    with zipfile.ZipFile(wheel) as file:
+        (name,) = (name for name in file.namelist() if name.endswith(".dist-info/METADATA"))
+        lines = file.read(name).decode().splitlines()
+    found = [line.removeprefix("Requires-Dist: ") for line in lines if line.startswith("Requires-Dist: ")]
+    return [one for one in found if "extra ==" not in one]
+
+
+@pytest.fixture(scope="module")
+def plain_wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel that an index would have: for all machines, without kernels."""
+    return built(tmp_path_factory.mktemp("built"))
+
+
+def test_a_wheel_asks_for_a_compiler_where_it_has_no_kernels_alone(plain_wheel, tmp_path):
+    kernels = tmp_path / "kernels"
+    kernels.mkdir()
+    (kernels / "one.kernel").write_bytes(b"kernel")
+    able = required(built(tmp_path, FLOWNAV_KERNELS=str(kernels)))
+    assert sorted(required(plain_wheel)) == sorted([*able, "numba>=0.61"])
+    assert not any(one.startswith(("numba", "llvmlite")) for one in able)
 
 
 def test_everything_that_is_no_code_ships_too(plain_wheel):
@@ -130,7 +152,7 @@ def test_the_wheel_works_in_an_empty_environment(plain_wheel, tmp_path):
     place = tmp_path / "empty"
     subprocess.run([sys.executable, "-m", "venv", str(place)], check=True)
     pip = [str(place / "bin" / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    subprocess.run([*pip, "--constraint", str(PROJECT / "constraints.txt"), f"{plain_wheel}[compile]"], check=True)
+    subprocess.run([*pip, "--constraint", str(PROJECT / "constraints.txt"), str(plain_wheel)], check=True)
     outside = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "FLOWNAV_CACHE")}
     outside |= {"FLOWNAV_CACHE": str(tmp_path / "cache"), "COLUMNS": "80"}
 

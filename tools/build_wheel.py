@@ -7,6 +7,7 @@ libraries of Numba's runtime that compiled code calls and the versions of the co
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
 import subprocess
@@ -17,12 +18,13 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.metadata import distribution
 from pathlib import Path
 
-from flownav.core.compiling.cache import COMPILERS, compilers
+from flownav.core.compiling.cache import COMPILERS, MAGIC, compilers
 from flownav.core.compiling.loaded import LIBRARIES, RUNTIME_FOLDER
 
 PROJECT = Path(__file__).resolve().parents[1]
 GATHERED = PROJECT / "build" / "kernels"
 DIST = PROJECT / "dist"
+DIGEST_BYTES = hashlib.sha256().digest_size
 RUN_AT, COMPILED_FOR = "x86-64-v3", ("x86-64-v4",)
 
 
@@ -65,20 +67,16 @@ def _function(kernel: Path) -> str:
     return kernel.name.rpartition("-")[0]
 
 
-def left_out(kernel: Path, temporary: Path) -> bool:
-    """Whether a kernel names a folder of this machine, as one that may raise NumPy's errors does: printed, not shipped.
+def nameless(kernel: bytes, temporary: Path) -> bytes:
+    """A kernel's file without the folders of this machine: one that may raise NumPy's errors names the file that does.
 
-    Who installs the wheel compiles it at its first use.
+    As many slashes stand for a folder, so that every length in the file stays right.
     """
-    told = PROJECT, temporary, Path.home(), Path(sys.prefix), Path(sys.base_prefix)
-    if found := machine_paths(kernel.read_bytes(), told):
-        print(f"left out: {kernel.name} names {', '.join(found)}", flush=True)
-    return bool(found)
-
-
-def machine_paths(content: bytes, folders: tuple[Path, ...]) -> list[str]:
-    """Which of these folders of the building machine a file names."""
-    return [str(folder) for folder in folders if os.fsencode(folder) + b"/" in content]
+    payload = kernel[len(MAGIC) + DIGEST_BYTES :]
+    for folder in sorted({PROJECT, temporary, Path.home(), Path(sys.prefix), Path(sys.base_prefix)}, reverse=True):
+        named = os.fsencode(folder) + b"/"
+        payload = payload.replace(named, b"/" * len(named))
+    return MAGIC + hashlib.sha256(payload).digest() + payload
 
 
 def main() -> None:
@@ -88,9 +86,8 @@ def main() -> None:
     GATHERED.mkdir(parents=True)
     with tempfile.TemporaryDirectory() as temporary:
         kernels = gather(Path(temporary))
-        carried = [path for path in kernels if not left_out(path, Path(temporary))]
-        for path in carried:
-            shutil.copyfile(path, GATHERED / path.name)
+        for path in kernels:
+            (GATHERED / path.name).write_bytes(nameless(path.read_bytes(), Path(temporary)))
     put_runtime(GATHERED)
     pip = ("-m", "pip", "wheel", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-build-isolation")
     for old in DIST.glob("flownav-*.whl"):
@@ -98,7 +95,7 @@ def main() -> None:
     python(*pip, "--wheel-dir", DIST, PROJECT, FLOWNAV_KERNELS=GATHERED)
     (wheel,) = DIST.glob("flownav-*.whl")
     size = wheel.stat().st_size / 1e6
-    print(f"{wheel.relative_to(PROJECT)}: {len(carried)} kernels, {size:.1f} MB, {time.monotonic() - start:.0f} s")
+    print(f"{wheel.relative_to(PROJECT)}: {len(kernels)} kernels, {size:.1f} MB, {time.monotonic() - start:.0f} s")
 
 
 if __name__ == "__main__":

@@ -13,6 +13,8 @@ import os
 import sys
 from pathlib import Path
 
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "helpers"))
+
 from flownav.cli import app
 from flownav.core.errors import VerdictError
 
@@ -31,6 +33,12 @@ COMMANDS = (
     "identify rig chirp --out sensor.toml",
     "pad --heights 1,2 --frames 2",
     "vehicle",
+    "sample csv ulog dataflash --out samples",
+    "info samples/flight.ulg",
+    "info samples/flight.bin",
+    "replay samples/flight.ulg --gps-outage 30:40 --no-report --out ulog.fnr",
+    "explain samples/flight-csv",
+    "campaign landing --flights 2 --out campaign",
 )
 
 
@@ -43,6 +51,7 @@ def main(folder: Path) -> None:
         with contextlib.suppress(VerdictError), contextlib.redirect_stdout(io.StringIO()):
             app([*line.split(), "--json"], standalone_mode=False)
     smooth_and_warm()
+    film_and_black_boxes()
     units_of_the_navigator()
 
 
@@ -60,6 +69,24 @@ def smooth_and_warm() -> None:
     log = log_of(Record.load(Path("landing.fnr")), assemble(load_scenario("landing")))
     replay(log, ReplayOptions(), NavigatorSettingsFile(), smoothed=True)
     warm_up()
+
+
+def film_and_black_boxes() -> None:
+    """The kernels of `flow`, which wants pictures, and of what reads logs of INAV and Betaflight."""
+    import numpy as np
+
+    from blackbox_logs import blackbox_log, quantised
+    from flownav.lab.optics.firmware import FIRST
+    from flownav.lab.optics.flow import raw_flow
+    from flownav.logs.open_log import open_log
+    from replay_logs import log_of_flight
+
+    raw_flow(np.random.default_rng(1).integers(0, 255, (3, 64, 64)).astype(np.uint8), FIRST)
+    flown = log_of_flight(4.0, imu_hz=100.0)
+    for inav in (True, False):
+        place = Path(f"LOG{inav:05d}.TXT")
+        place.write_bytes(blackbox_log(quantised(flown.tables, inav), inav).content())
+        open_log(place)
 
 
 def units_of_the_navigator() -> None:

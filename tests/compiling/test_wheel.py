@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import pickle
 import shutil
 import subprocess
 import sys
@@ -15,7 +16,7 @@ import pytest
 
 import build_wheel
 import compile_again
-from flownav.core.compiling import closure
+from flownav.core.compiling import cache, closure
 from places import PROJECT
 
 PARTS = """
@@ -75,12 +76,18 @@ def test_an_installed_library_is_one_wherever_it_lies():
     assert not closure.is_of_library("/home/user/project/law.py")
 
 
-def test_a_kernel_that_names_a_folder_of_this_machine_is_left_out_and_said(tmp_path, capsys):
-    kept, named = tmp_path / "kept.kernel", tmp_path / "named.kernel"
-    kept.write_bytes(b"machine code")
-    named.write_bytes(b"machine code, raised in " + os.fsencode(PROJECT / "src" / "law.py"))
-    assert [build_wheel.left_out(path, tmp_path) for path in (kept, named)] == [False, True]
-    assert capsys.readouterr().out == f"left out: named.kernel names {PROJECT}\n"
+def test_a_kernel_names_no_folder_of_this_machine(tmp_path):
+    store = cache.Store(tmp_path / "own", tmp_path / "shipped")
+    places = [PROJECT / "src" / "law.py", tmp_path / "work", Path.home() / "law.py"]
+    store.save("named.kernel", pickle.dumps([str(place) for place in places]))
+    kernel = (store.own / "named.kernel").read_bytes()
+    store.shipped.mkdir()
+    (store.shipped / "named.kernel").write_bytes(build_wheel.nameless(kernel, tmp_path))
+    payload = store.load("named.kernel")  # its checksum is right
+    slashes = ["/" * len(f"{folder}/") for folder in (PROJECT, tmp_path, Path.home())]
+    expected = [slashes[0] + "src/law.py", slashes[1] + "work", slashes[2] + "law.py"]
+    assert payload is not None
+    assert pickle.loads(payload) == expected
 
 
 # pages are drawn by the script that the wheel brings; what needs more says so in one line

@@ -52,6 +52,7 @@ COMMANDS = {  # by name, as the help lists them
     "faults": "Let sensors fail on a landing: when it is noticed, what it costs.",
     "validate": "Hold the simulator against recorded flights, figure beside figure.",
     "vehicle": "Trim, power, linear models and ground effect of a helicopter.",
+    "app": "A page for who does not type: logs, GPS cuts, flights, certificates.",
     "report": "Write a record's report as one HTML page.",
     "view": "Show a record in space and time with Rerun, or write its .rrd.",
     "export": "Write a record as MCAP, TUM, EuRoC, Parquet, CSV, ULog, KML or GPX.",

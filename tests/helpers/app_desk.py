@@ -12,7 +12,7 @@ from flownav.app.desk import Desk
 from flownav.app.doors import Doors
 from flownav.app.server import application
 from flownav.app.shelf import Shelf
-from flownav.cli.app import WORKER
+from flownav.cli.page import WORKER
 
 TOKEN, PORT = "token-of-the-tests", 8047
 BASE = f"http://127.0.0.1:{PORT}"

@@ -28,7 +28,7 @@ def drift_of(asked: dict[str, Any]) -> dict[str, Any]:
 
     asked: path; cuts, a list of (t0, t1) [s]; flow, whether it is fused; flow_scale, its two factors; gps_delay_s.
     Gives span_s; outages, each with horizontal_rms_m and horizontal_max_m (None where GPS or truth do not cover it);
-    path, gps and truth, north and east [m]; error, the distance from GPS over time, (t_s, m). InputError as
+    path and gps, north and east [m]; away, the distance from GPS over time, (t_s, m). InputError as
     `flownav replay`.
     """
     cuts = tuple((float(t0), float(t1)) for t0, t1 in asked.get("cuts", [])[:MOST_CUTS])
@@ -43,7 +43,7 @@ def drift_of(asked: dict[str, Any]) -> dict[str, Any]:
         "outages": [_figures(flown, *cut) for cut in cuts],
         "path": thinned(way, POINTS),
         "gps": thinned(_fixes(base.log), POINTS),
-        "error": _error(flown),
+        "away": _away(flown),
     }
 
 
@@ -74,7 +74,7 @@ def _fixes(log: Log) -> Array:
     return np.zeros((0, 3)) if stream is None else stream.value[:, :3]
 
 
-def _error(flown: Replay) -> list[list[float]]:
+def _away(flown: Replay) -> list[list[float]]:
     """The horizontal distance of the estimate from GPS where there is a fix, over time; empty without GPS."""
     stream = flown.log.streams.get(Sensor.GPS_POSITION)
     if stream is None:

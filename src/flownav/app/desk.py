@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from flownav.app.jobs import COMMAND, Jobs
-from flownav.app.shelf import Shelf
+from flownav.app.shelf import LOOKED_AT, Shelf
 from flownav.app.warm import Warm
 from flownav.core.errors import InputError
 
@@ -29,7 +29,7 @@ class Desk:
         """The page's state: the folder, what lies in it, and the jobs."""
         entries = self.shelf.entries()
         for entry in entries:
-            if entry["kind"] != "campaign" and entry["look"] is None:
+            if entry["kind"] in LOOKED_AT and entry["look"] is None:
                 self.look(entry["name"])
             entry["looking"] = entry["name"] in self.looking
         jobs = [job.shown() for job in self.jobs.all.values()]
@@ -71,6 +71,8 @@ class Desk:
             raise InputError("no such question")
         if "file" in question:
             question["path"] = str(self.shelf.existing(str(question["file"])))
+        if question.get("sensor"):
+            question["sensor"] = str(self.shelf.existing(str(question["sensor"])))
         return await self.bench.ask(question)
 
     async def close(self) -> None:

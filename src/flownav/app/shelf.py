@@ -15,7 +15,9 @@ from flownav.core.free_names import free_name
 KEPT = ".flownav-app"
 LOG_SUFFIXES = (".ulg", ".bin", ".log", ".tlog", ".mcap", ".bag", ".db3", ".bbl", ".bfl", ".crazyflie")
 RECORD = ".fnr"
+LOOKED_AT = ("log", "record")
 FOLDER_HOLDS = (".csv", ".db3", ".mcap")  # of a folder that is one log
+SENSOR = "-sensor.toml"  # as the page has `flownav identify` write them
 CAMPAIGN = "campaign.json"
 LONGEST_NAME = 120
 FORBIDDEN = set('/\\:*?"<>|')
@@ -55,11 +57,11 @@ class Shelf:
             if kind:
                 info = path.stat()
                 found.append({"name": path.name, "kind": kind, "bytes": _bytes_of(path), "written_s": info.st_mtime,
-                              "look": self.look_of(path) if kind != "campaign" else None})  # fmt: skip
+                              "look": self.look_of(path) if kind in LOOKED_AT else None})  # fmt: skip
         return sorted(found, key=lambda entry: (-entry["written_s"], entry["name"]))
 
     def _kind(self, path: Path) -> str:
-        """log, record, campaign, or "" for what the page does not show."""
+        """log, record, sensor, campaign, or "" for what the page does not show."""
         if path.name.startswith(".") or path.is_symlink():
             return ""
         if path.is_dir():
@@ -67,6 +69,8 @@ class Shelf:
                 return "campaign"
             holds = any(each.suffix.lower() in FOLDER_HOLDS for each in path.iterdir())
             return "log" if holds else ""
+        if path.name.endswith(SENSOR):
+            return "sensor"
         if path.suffix.lower() == RECORD:
             return "record"
         return "log" if path.suffix.lower() in LOG_SUFFIXES or path.name in self.dropped else ""

@@ -95,6 +95,7 @@ def _campaign(asked: Asked, shelf: Shelf) -> Task:
     if from_deg:
         words += ["--set", f"wind.from_direction_deg={number(from_deg, 0, 360)}"]
     words += ["--set", f"gps.model={word(asked['gps'])}"] if asked.get("gps") else []
+    words += ["--set", f"flow_sensor={word(asked['sensor'])}"] if asked.get("sensor") else []
     folder = asked.get("folder")
     out = shelf.path_of(folder).name if folder else shelf.free(f"{scenario}_campaign").name
     return Task((*words, "--out", out), (), out)

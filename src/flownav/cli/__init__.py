@@ -17,9 +17,10 @@ from flownav.core.version import __version__
 DONE, BAD_VERDICT, BAD_INPUT, BROKEN_OFF = 0, 1, 2, 130  # the last of Ctrl-C, as shells have it
 # commands that share a module, and the function that each is there; any other is `command` of a module of its name
 ELSEWHERE = {
-    "report": ("records", "report"), "view": ("records", "view"), "export": ("records", "export_to"),
-    "recover": ("records", "recover"), "schema": ("bench", "schema"), "tune": ("compare", "tune_settings"),
-    "sample": ("rig", "sample"), "info": ("replay", "info"), "flow": ("identify", "flow"),
+    "app": ("page", "command"), "report": ("records", "report"), "view": ("records", "view"),
+    "export": ("records", "export_to"), "recover": ("records", "recover"), "schema": ("bench", "schema"),
+    "tune": ("compare", "tune_settings"), "sample": ("rig", "sample"), "info": ("replay", "info"),
+    "flow": ("identify", "flow"),
     "validate": ("paper", "validate"), "envelope": ("campaign", "envelope"), "verify": ("build", "verify"),
 }  # fmt: skip
 # options that are not called as the argument in Python is, without its unit

@@ -1,6 +1,6 @@
 // The logs of the folder: drop them in, see what each is, and what can be made of it.
 
-import { act, follow, post, start, state } from "./ask.js";
+import { act, fileUrl, follow, post, start, state } from "./ask.js";
 import { button, el, size, thumbnail } from "./dom.js";
 import { chosen, dropped, upload } from "./uploads.js";
 
@@ -67,11 +67,19 @@ function campaignRow(file) {
       el("p", { class: "actions" }, el("a", { class: "button", href: `#fly/${encodeURIComponent(file.name)}` }, "Open"))));
 }
 
+function sensorRow(file) {
+  return el("li", { "data-file": file.name }, el("div", { class: "thumbnail none" }),
+    el("div", { class: "about" }, el("h3", {}, file.name, " ", el("small", {}, "flow sensor, which Fly can take")),
+      el("p", { class: "actions" }, el("a", { class: "button", href: fileUrl(file.name), download: file.name }, "Download"))));
+}
+
+const ROWS = { log: row, record: row, campaign: campaignRow, sensor: sensorRow };
+
 function draw({ files }) {
   const open = new Set([...list.querySelectorAll("details[open]")].map((each) => each.closest("li").dataset.file));
   const focused = document.activeElement;
   const place = list.contains(focused) ? [focused.closest("li").dataset.file, focused.textContent] : null;
-  list.replaceChildren(...files.map((file) => (file.kind === "campaign" ? campaignRow(file) : row(file))));
+  list.replaceChildren(...files.map((file) => ROWS[file.kind](file)));
   for (const each of list.querySelectorAll("details")) each.open = open.has(each.closest("li").dataset.file);
   if (place) {
     const same = [...list.querySelectorAll("li")].find((each) => each.dataset.file === place[0]);
@@ -79,7 +87,7 @@ function draw({ files }) {
   }
   for (const name of [...ticked]) if (!files.some((file) => file.name === name)) ticked.delete(name);
   compare.disabled = ticked.size < 2;
-  compare.hidden = files.filter((file) => file.kind !== "campaign").length < 2;
+  compare.hidden = files.filter((file) => ["log", "record"].includes(file.kind)).length < 2;
 }
 
 function dropZone() {

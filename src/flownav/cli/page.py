@@ -15,7 +15,7 @@ from flownav.cli.output import emit
 
 FOLDER = "The folder of logs and results, made if it is not there."
 PORT = "The port on this machine."
-WORKER = (sys.executable, "-m", "flownav.cli.app_worker")
+WORKER = (sys.executable, "-m", "flownav.cli.page_worker")
 
 
 def command(

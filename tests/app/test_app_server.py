@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import time
 from pathlib import Path
 
 import pytest
 
-pytest.importorskip("starlette", reason="install `starlette` (dependency group `test`)")
-
 from app_desk import BASE, PORT, TOKEN, Page, client_of, desk_of, until
 from flownav.app import uploads
+from flownav.app.server import STATIC
 from flownav.app.shelf import KEPT, Shelf
 from flownav.core.errors import InputError
 
@@ -68,10 +68,6 @@ def test_every_answer_is_of_one_page_and_kept_by_nobody(page, tmp_path):
 
 
 def test_every_module_and_style_that_a_page_names_is_there(page):
-    import re
-
-    from flownav.app.server import STATIC
-
     texts = [page.get("").text, *(path.read_text(encoding="utf-8") for path in STATIC.glob("*.js"))]
     names = set(re.findall(r'static/([\w.]+)|"\./([\w.]+)"', " ".join(texts)))
     assert len(names) > 8
@@ -284,3 +280,32 @@ def test_the_state_is_json_whatever_files_are_called(page, tmp_path):
     names = [each["name"] for each in json.loads(page.get("api/state").text)["files"]]
     assert names == ["<img src=x onerror=alert(1)>.ulg"]
     assert time.time() - page.state()["files"][0]["written_s"] < 3600.0
+
+
+# -- a requirement of one's own ------------------------------------------------------------------------------------
+ASKED = {"scenario": "approach", "measure": "touchdown.rest_m", "at_most": 0.5, "probability": 0.95, "confidence": 0.9,
+         "wind_m_s": 4}  # fmt: skip
+
+
+def test_a_form_is_a_requirement_that_certify_reads(page, tmp_path):
+    from flownav.campaigns.requirement import load_requirement
+
+    name = page.post("api/requirement", ASKED).json()["name"]
+    found = load_requirement(str(tmp_path / name))
+    assert (found.scenario, found.requirement[0].measure) == ("approach", "touchdown.rest_m")
+    assert (found.requirement[0].at_most, found.requirement[0].probability) == (0.5, 0.95)
+    assert page.post("api/requirement", ASKED).json()["name"] == name
+    assert page.post("api/requirement", {**ASKED, "at_most": 0.4}).json()["name"] != name
+    job = page.post("api/jobs", {"kind": "certify", "requirement": name, "plan": True}).json()
+    assert job["command"] == f"flownav certify {name} --plan"
+
+
+@pytest.mark.parametrize("wrong", [
+    {"measure": "crash.x"}, {"measure": None}, {"at_most": "x"}, {"probability": 2}, {"confidence": -1},
+    {"wind_m_s": 99}, {"scenario": "../x"},
+])  # fmt: skip
+def test_a_form_that_cannot_be_is_one_line(page, tmp_path, wrong):
+    answer = page.post("api/requirement", {**ASKED, **wrong})
+    assert answer.status_code == 400
+    assert "\n" not in answer.json()["error"]
+    assert list(tmp_path.iterdir()) == []

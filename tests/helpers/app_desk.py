@@ -8,6 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from flownav.app.desk import Desk
 from flownav.app.doors import Doors
 from flownav.app.server import application
@@ -15,6 +17,7 @@ from flownav.app.shelf import Shelf
 from flownav.cli.page import WORKER
 
 TOKEN, PORT = "token-of-the-tests", 8047
+MISSING = "install `starlette` and `httpx2` (dependency group `test`)"
 BASE = f"http://127.0.0.1:{PORT}"
 # answers with what it was asked; a question about `slow` takes for ever, one about `broken` ends it
 ECHO = """
@@ -47,9 +50,11 @@ def desk_of(folder: Path, *, real: bool = False) -> Desk:
 
 def client_of(desk: Desk) -> Any:
     """A client that has the token in its address; to be used as a context, in which jobs and looks go on."""
-    from starlette.testclient import TestClient
+    testing = pytest.importorskip(
+        "starlette.testclient", reason="install `starlette`, `httpx2` (dependency group `test`)"
+    )
 
-    return TestClient(Doors(application(desk), TOKEN, PORT), base_url=BASE)
+    return testing.TestClient(Doors(application(desk), TOKEN, PORT), base_url=BASE)
 
 
 def until(read: Callable[[], Any], patience_s: float = 120.0) -> Any:

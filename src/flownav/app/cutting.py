@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from flownav.app.looking import thinned
+from flownav.core.errors import arg
 from flownav.core.measurement import Array, Sensor
 from flownav.core.record import POSITION_NED
 from flownav.logs.log import Log
 from flownav.logs.open_log import open_flight
 from flownav.replays.fed import as_fed
-from flownav.replays.prepare import ReplayOptions
+from flownav.replays.prepare import ReplayOptions, check_windows
 from flownav.replays.session import Replay, replay, replay_again
 from flownav.scoring.path import columns_of
 
@@ -33,6 +34,7 @@ def drift_of(asked: dict[str, Any]) -> dict[str, Any]:
     """
     cuts = tuple((float(t0), float(t1)) for t0, t1 in asked.get("cuts", [])[:MOST_CUTS])
     base = _at_hand(asked)
+    check_windows(base.log, cuts, arg("gps_outages"))
     options = replace(base.options, gps_outages_s=cuts, use_flow=bool(asked.get("flow", True)))
     options, settings = as_fed(base.log, options, None)
     flown = replay_again(base, options, settings)

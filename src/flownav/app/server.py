@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from flownav.app import uploads
 from flownav.app.desk import Desk
 from flownav.app.doors import NAMES, WRITTEN_POLICY, Doors
+from flownav.app.requirements import kept_requirement
 from flownav.app.shelf import Shelf
 from flownav.app.tasks import command_line, flight_words, task_of
 from flownav.core.errors import InputError, arg
@@ -53,6 +54,7 @@ def application(desk: Desk) -> Any:
         Route("/api/remove", _of(desk, _remove), methods=["POST"]),
         Route("/api/look", _of(desk, _look), methods=["POST"]),
         Route("/api/ask", _of(desk, _ask), methods=["POST"]),
+        Route("/api/requirement", _of(desk, _requirement), methods=["POST"]),
         Route("/api/jobs", _of(desk, _start), methods=["POST"]),
         Route("/api/jobs/{number:int}", _of(desk, _cancel), methods=["DELETE"]),
     ]
@@ -81,12 +83,11 @@ def serve(folder: Path, port: int, worker: Sequence[str], begun: Callable[[str],
         import uvicorn
     except ImportError:
         raise InputError(NEEDED) from None
+    inside, token = application(Desk(Shelf(folder), worker)), secrets.token_urlsafe(TOKEN_BYTES)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{arg('folder')} {folder}: cannot be made ({error.strerror}); give another") from error
-    token = secrets.token_urlsafe(TOKEN_BYTES)
-    inside = application(Desk(Shelf(folder), worker))
     with listening(port) as found:
         number = found.getsockname()[1]
         config = uvicorn.Config(Doors(inside, token, number), log_level="warning", access_log=False, loop="asyncio",
@@ -229,6 +230,10 @@ def _command_of(desk: Desk, asked: dict[str, Any]) -> str:
         asked["words"] = flight_words(asked)
         return command_line(task_of("fly", asked, desk.shelf).words)
     return ""
+
+
+async def _requirement(desk: Desk, request: "Request") -> "Response":
+    return _json({"name": kept_requirement(await _asked(request), desk.shelf)})
 
 
 async def _start(desk: Desk, request: "Request") -> "Response":

@@ -111,7 +111,7 @@ def _certify(asked: Asked, shelf: Shelf) -> Task:
     if asked.get("plan"):
         return Task((*words, "--plan"), (), "")
     folder = asked.get("folder")
-    out = shelf.path_of(folder).name if folder else shelf.free(f"{requirement}_certificate").name
+    out = shelf.path_of(folder).name if folder else shelf.free(f"{Path(requirement).stem}_certificate").name
     return Task((*words, "--out", out), (), out)
 
 

@@ -84,7 +84,7 @@ export function show(main, asked) {
       ...shown.map(([a, b]) => svg("rect", { class: "cut", x: place(a), y: TOP, width: Math.max(1, place(b) - place(a)), height: HIGH - TOP - BOTTOM })),
       svg("line", { x1: LEFT, x2: WIDE - RIGHT, y1: down(0), y2: down(0) }),
       svg("text", { x: 4, y: TOP + 10 }, `${most.toFixed(1)} m`), svg("text", { x: 4, y: down(0) }, "0"),
-      ...ticks.map((t, k) => svg("text", { x: place(t), y: HIGH - 8, "text-anchor": ["start", "middle", "middle", "middle", "end"][k] }, `${t.toFixed(0)} s`)),
+      ...ticks.map((t, k) => svg("text", { x: place(t), y: HIGH - 8, "text-anchor": ["start", "middle", "middle", "middle", "end"][k] }, `${Math.round(t) + 0} s`)),
       svg("polyline", { class: "estimate", points: points(answer.away, ([t, away]) => [place(t), down(away)]) }));
   }
 

@@ -9,9 +9,12 @@ import pytest
 from app_desk import Page, client_of, desk_of, until
 from blackbox_logs import blackbox_log, quantised
 from crazyflie_logs import deck_log
+from crazyflie_logs import quantised as deck_tables
 from dataflash_files import dataflash_of
 from flownav.core.record import Record
+from mavlink_logs import flight_log
 from replay_logs import log_of_flight
+from ros_bags import ros_flight
 from ulog_files import ulog_of_flight
 
 
@@ -40,12 +43,16 @@ def content_of(name: str, flown, tmp_path: Path) -> bytes:
     if name == "log.bbl":
         return blackbox_log(quantised(flown.tables, inav=True), inav=True).content()
     if name == "log00":
-        return deck_log(flown.tables).content()
+        return deck_log(deck_tables(flown.tables)).content()
+    if name == "log.tlog":
+        return flight_log(30.0).content
+    if name == "log.bag":
+        return ros_flight(flown.tables).write_ros_1(tmp_path / "x.bag").read_bytes()
     Record({"kind": "fly"}).save(tmp_path / "x.fnr")
     return (tmp_path / "x.fnr").read_bytes()
 
 
-@pytest.mark.parametrize("name", ["log.ulg", "log.bin", "log.bbl", "log00"])
+@pytest.mark.parametrize("name", ["log.ulg", "log.bin", "log.bbl", "log.tlog", "log.bag", "log00"])
 def test_a_log_of_each_format_has_a_verdict_and_a_path(page, flown, tmp_path, name):
     assert page.upload(name, content_of(name, flown, tmp_path)).json() == {"name": name}
     look = page.look(name)

@@ -17,9 +17,10 @@ from flownav.core.version import __version__
 DONE, BAD_VERDICT, BAD_INPUT, BROKEN_OFF = 0, 1, 2, 130  # the last of Ctrl-C, as shells have it
 # commands that share a module, and the function that each is there; any other is `command` of a module of its name
 ELSEWHERE = {
-    "report": ("records", "report"), "view": ("records", "view"), "export": ("records", "export_to"),
-    "recover": ("records", "recover"), "schema": ("bench", "schema"), "tune": ("compare", "tune_settings"),
-    "sample": ("rig", "sample"), "info": ("replay", "info"), "flow": ("identify", "flow"),
+    "app": ("page", "command"), "report": ("records", "report"), "view": ("records", "view"),
+    "export": ("records", "export_to"), "recover": ("records", "recover"), "schema": ("bench", "schema"),
+    "tune": ("compare", "tune_settings"), "sample": ("rig", "sample"), "info": ("replay", "info"),
+    "flow": ("identify", "flow"),
     "validate": ("paper", "validate"), "envelope": ("campaign", "envelope"), "verify": ("build", "verify"),
 }  # fmt: skip
 # options that are not called as the argument in Python is, without its unit
@@ -52,6 +53,7 @@ COMMANDS = {  # by name, as the help lists them
     "faults": "Let sensors fail on a landing: when it is noticed, what it costs.",
     "validate": "Hold the simulator against recorded flights, figure beside figure.",
     "vehicle": "Trim, power, linear models and ground effect of a helicopter.",
+    "app": "A page for who does not type: logs, GPS cuts, flights, certificates.",
     "report": "Write a record's report as one HTML page.",
     "view": "Show a record in space and time with Rerun, or write its .rrd.",
     "export": "Write a record as MCAP, TUM, EuRoC, Parquet, CSV, ULog, KML or GPX.",

@@ -192,6 +192,7 @@ def render_certificate(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> st
     page: str = template("certificate.html.j2").render(
         facts=facts,
         own=facts["requirement"],
+        title=in_words(facts["requirement"]["name"]),
         headline=HEADLINES[facts["verdict"]],
         sentence=SENTENCES[facts["verdict"]],
         together=together(facts),

@@ -182,7 +182,7 @@ def test_the_vehicle_that_hovers_is_found_as_before():
 
 
 def test_messages_that_nobody_knows_are_no_losses(wires):
-    """A vehicle of another dialect: 356 of its 357 frames were said to be lost."""
+    """A vehicle of another dialect: 356 of its 357 frames were counted as lost."""
     wire = wires()
     strange = [0]
 

@@ -179,3 +179,28 @@ def test_many_strangers_are_not_remembered_without_end():
 
 def test_the_vehicle_that_hovers_is_found_as_before():
     assert hovering(4).session.turns == 0
+
+
+def test_messages_that_nobody_knows_are_no_losses(wires):
+    """A vehicle of another dialect: 356 of its 357 frames were counted as lost."""
+    wire = wires()
+    strange = [0]
+
+    def more():
+        mav = wire.vehicle.mav
+        wire.socket.send(bytes([0xFD, 4, 0, 0, mav.seq, 1, 1, 0x39, 0x30, 0, 1, 2, 3, 4, 5, 6]))  # number 12345
+        mav.seq = (mav.seq + 1) % 256
+        strange[0] += 1
+
+    wire.fly(4.0, beside=more)
+    assert strange[0] == 400
+    assert wire.session.dropped["link: unknown_message"] == 400
+    assert wire.session.dropped.get("link: lost", 0) == 0
+    assert wire.session.reason == ""
+
+
+def test_a_ground_station_is_no_other_autopilot(wires):
+    wire = wires().fly(3.0, beside=None)
+    wire.fly(3.0, beside=beats(wire, (255, 190, GCS, INVALID_AUTOPILOT)))
+    assert wire.session.dropped["link: other_system"] >= 3
+    assert wire.session.reception.others == []

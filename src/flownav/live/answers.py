@@ -152,11 +152,11 @@ def fault_of(estimate: say.Estimate, limits: Limits, base: Base = NOTHING) -> st
     """Why the estimate itself must not be sent: `not_finite`, `too_fast`, `uncertain_down`, `uncertain`, or ""."""
     assert estimate.pose_covariance is not None
     assert estimate.velocity_covariance is not None
-    pose, velocity = np.diag(estimate.pose_covariance), np.diag(estimate.velocity_covariance)
-    numbers = (*estimate.pos_ned_m, *estimate.vel_ned_m_s, *estimate.quaternion)
-    if not (np.isfinite(numbers).all() and np.isfinite(pose).all() and np.isfinite(velocity).all()):
+    pose, velocity = estimate.pose_covariance.diagonal().tolist(), estimate.velocity_covariance.diagonal().tolist()
+    numbers = (*estimate.pos_ned_m, *estimate.vel_ned_m_s, *estimate.quaternion, *pose, *velocity)
+    if not all(map(math.isfinite, numbers)):
         return "not_finite"
-    if velocity[:3].max() > limits.sigma_m_s**2:
+    if max(velocity[:3]) > limits.sigma_m_s**2:
         return "too_fast"
     if pose[2] > limits.sigma_down_m**2:
         return "uncertain_down"

@@ -117,7 +117,8 @@ class Filtering:
         run(queue, on)
         written = written_on(on.tape)
         self._keeper.written(*written)
-        self.jumps += sum(kind in JUMPS for kind in EventRow.of(written.event).kind.tolist())
+        if len(written.event):
+            self.jumps += sum(kind in JUMPS for kind in EventRow.of(written.event).kind.tolist())
         return Outcome(len(queue.t_s), written.innovation, written.event)
 
     def now(self, t_s: float) -> NowRow[Array]:

@@ -89,10 +89,10 @@ class _SourceHistory:
         near = before is not None and math.dist(before.reading.value[3:6], force) <= FLICKER_M_S2
         if near and self.jumped and sample.t_s - self.erred_s < RECOVERED_S:
             return True
-        usual = self.usual(sample.t_s - BEFORE_S)
-        if usual is None or math.dist(usual.force, force) <= APART_M_S2:
+        columns = self._lately(sample.t_s - BEFORE_S)
+        if columns is None or math.dist(map(median, columns), force) <= APART_M_S2:
             return False
-        self.healthy = usual if sample.t_s - self.erred_s > RECOVERED_S else self.healthy
+        self.healthy = _usual_of(columns) if sample.t_s - self.erred_s > RECOVERED_S else self.healthy
         return True
 
     @property
@@ -103,17 +103,24 @@ class _SourceHistory:
 
     def usual(self, t_s: float) -> Usual | None:
         """Medians over the LOOK_S before an instant; None where there are too few readings."""
+        columns = self._lately(t_s)
+        return _usual_of(columns) if columns is not None else None
+
+    def _lately(self, t_s: float) -> list[tuple[float, ...]] | None:
+        """The forces of the LOOK_S before an instant, axis by axis; None where there are too few readings."""
         lately: list[tuple[float, ...]] = []
         for sample in reversed(self.kept):
             if t_s - sample.t_s > LOOK_S or len(lately) == MOST_COMPARED:
                 break
             if sample.t_s <= t_s:
                 lately.append(sample.reading.value[3:6])
-        if len(lately) < LEAST_COMPARED:
-            return None
-        columns = list(zip(*lately, strict=True))
-        x, y, z = map(median, columns)
-        return Usual((x, y, z), math.sqrt(sum(map(_variance, columns)) / len(lately)))
+        return list(zip(*lately, strict=True)) if len(lately) >= LEAST_COMPARED else None
+
+
+def _usual_of(columns: list[tuple[float, ...]]) -> Usual:
+    """The medians of forces."""
+    x, y, z = map(median, columns)
+    return Usual((x, y, z), math.sqrt(sum(map(_variance, columns)) / len(columns[0])))
 
 
 def _variance(values: tuple[float, ...]) -> float:

@@ -3,11 +3,11 @@
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from flownav.core.errors import InputError, arg
 from flownav.live.autopilots import KNOWN, Autopilots, Who
-from flownav.logs.mavlink.framing import Message, StreamFrames, coder, dialect
+from flownav.logs.mavlink.framing import Decoder, Message, StreamFrames, dialect
 from flownav.logs.mavlink.signing import SignatureCheck
 
 HEARTBEAT = 0
@@ -82,7 +82,7 @@ class Reception:
         self._wanted = system, component
         self._frames = StreamFrames()
         self._check = SignatureCheck(key, unix_s) if key else None
-        self._coder: Any = coder()
+        self._decoder = Decoder()
         self._error = dialect().MAVError
         self._sequence: int | None = None
         self._others: set[tuple[int, int]] = set()
@@ -196,7 +196,7 @@ class Reception:
 
     def _decoded(self, content: bytes) -> Message | None:
         try:
-            return self._coder.decode(bytearray(content))
+            return self._decoder.decode(content)
         except (self._error, ValueError):
             self._counts["undecodable"] += 1
             return None

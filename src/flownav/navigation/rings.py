@@ -30,9 +30,10 @@ from flownav.navigation.waiting import (
     taken_out,
     wait,
 )
-from flownav.navigation.waiting_records import READING, SILENT, WITHHELD, Arrival, Queue, Sizes, arrival_of
+from flownav.navigation.waiting_records import SILENT, WITHHELD, Arrival, Queue, Sizes, arrival_of
 
 ORDERS = 1 << 15  # more than wait at any time
+NOT_GIVEN = (np.nan,) * 6
 
 
 class Given(NamedTuple):
@@ -48,11 +49,8 @@ def numbers_of(
     exposure_s: float = 0.0, withheld: float = waiting_records.AS_IS,
 ) -> Array:  # fmt: skip
     """The numbers of a reading; what is not given is NaN."""
-    numbers = np.full(READING, np.nan)
-    for at, given in ((0, tuple(value)[:6]), (6, tuple(variance)[:3])):
-        numbers[at : at + len(given)] = given
-    numbers[9:] = quality, delay_s, exposure_s, withheld
-    return numbers
+    values, variances = (*value, *NOT_GIVEN)[:6], (*variance, *NOT_GIVEN)[:3]
+    return np.array((*values, *variances, quality, delay_s, exposure_s, withheld), np.float64)
 
 
 def given_of(queue: EventQueue) -> Iterator[Given]:
@@ -82,6 +80,7 @@ class Rings:
         self._at, self._arrival_s = np.zeros(2), np.zeros(ORDERS)
         self._room, self._order = empty_queue(most), np.zeros(most)
         self._now = np.zeros(NOW_NUMBERS)
+        self._released_s = -np.inf  # up to when all is released that has been taken
         assert sizes.ring + sizes.table < ORDERS
         self.clear()
 
@@ -98,10 +97,12 @@ class Rings:
     def clear(self) -> None:
         """Forget all; instants before the newest that was released stay gone."""
         empty(self.rings)
+        self._released_s = -np.inf
 
     def take(self, given: Given) -> int:
         """Let a reading wait: TAKEN, or why not (`waiting`)."""
         self._at[:] = given.t_s, given.sensor
+        self._released_s = -np.inf
         status = int(_take(self.rings, self._at, given.numbers))
         if status == TAKEN:
             self._arrival_s[int(self._queue.order) % ORDERS] = given.t_s
@@ -109,6 +110,7 @@ class Rings:
 
     def take_back(self, since_s: float) -> int:
         """Inertial readings from an instant on were of a sensor that errs; how many of them still waited."""
+        self._released_s = -np.inf
         return int(_take_back(self.rings, since_s))
 
     def waiting(self) -> EventQueue:
@@ -122,7 +124,10 @@ class Rings:
 
         settings: packed, of the navigator that takes them.
         """
-        count = _release(self.rings, settings, until_s, False, self._room, self._order)
+        nothing_new = until_s <= self._released_s
+        count = 0 if nothing_new else _release(self.rings, settings, until_s, False, self._room, self._order)
+        if count < len(self._order):
+            self._released_s = max(self._released_s, until_s)
         arrival_s = self._arrival_s[self._order[:count].astype(int) % ORDERS]
         return Due(EventQueue._make(column[:count] for column in self._room), arrival_s)
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.compile import Lanes, Work, equation, pointer, procedure
+from flownav.core.compile import Lanes, Work, equation, places_of, pointer, procedure
 from flownav.core.measurement import COLUMNS, Array, EventQueue, Sensor
 from flownav.estimation.hypotheses import NAMES as FAULTS
 from flownav.estimation.states import STATES
@@ -99,12 +99,12 @@ class Tape(NamedTuple):
     def estimates(self, lane: int = 0) -> Array:
         """The estimates of one lane, (n, ESTIMATE_COLUMNS)."""
         rows = self.estimate[: self.used[ESTIMATES], :, lane]
-        return np.ascontiguousarray(rows[np.isfinite(EstimateRow.of(rows).t_s)])
+        return np.ascontiguousarray(rows[np.isfinite(rows[:, places_of(EstimateRow).t_s])])
 
     def offers(self, lane: int = 0) -> Array:
         """Outcomes of each component in one lane, (m, INNOVATION_COLUMNS)."""
         rows = self.innovation[: self.used[OFFERED_ROWS], :, lane]
-        return np.ascontiguousarray(rows[InnovationRow.of(rows).reason != SILENT])
+        return np.ascontiguousarray(rows[rows[:, places_of(InnovationRow).reason] != SILENT])
 
     def events(self, lane: int = 0) -> Array:
         """The happenings of one lane, (k, EVENT_COLUMNS)."""

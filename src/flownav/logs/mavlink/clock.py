@@ -163,10 +163,8 @@ def _received(
     state: ClockState, name: ClockName, clock: _Clock, arrival_s: float, leads: bool, event: str = ""
 ) -> tuple[ClockState, Aligned]:
     t_s = clock.stamp_s + clock.offset_s
-    state = state._replace(clocks={**state.clocks, name: clock})
-    if leads:
-        state = state._replace(log_s=t_s, arrival_s=arrival_s)
-    return state, Aligned(t_s, event=event)
+    log_s, since_s = (t_s, arrival_s) if leads else (state.log_s, state.arrival_s)
+    return ClockState(state.reference, log_s, since_s, {**state.clocks, name: clock}), Aligned(t_s, event=event)
 
 
 def _turns(clock: _Clock, stamp: Stamp) -> int:

@@ -19,6 +19,7 @@ import re
 import struct
 from collections import Counter
 from collections.abc import Callable, Iterator
+from operator import itemgetter
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -188,6 +189,36 @@ class Check:
         arrival = b"" if timestamp is None else content[timestamp : timestamp + TIMESTAMP_BYTES]
         arrival_us = int.from_bytes(arrival, "big")
         return Frame(start, end, arrival_us, message_id, system, component, signed)
+
+
+class Decoder:
+    """From frames whose checksum holds to messages, as pymavlink's `MAVLink.decode` makes them, in a third of its time:
+    it looks at the checksum once more, and at each field's place. Messages with arrays or texts are left to it.
+    """
+
+    def __init__(self) -> None:
+        module = dialect()
+        self._coder: Any = coder()
+        self._header: Any = module.MAVLink_header
+        self._plain = {
+            number: (kind, itemgetter(*kind.orders), kind.unpacker)
+            for number, kind in module.mavlink_map.items()
+            if 1 < len(kind.orders) == sum(kind.lengths) and "s" not in kind.unpacker.format
+        }
+
+    def decode(self, frame: bytes) -> Message:
+        """The message of one frame. MAVError where pymavlink cannot decode it."""
+        number = int.from_bytes(frame[7:10], "little") if frame[0] == MAVLINK_2 else -1
+        if number not in self._plain or frame[2]:  # of the first version, with texts, or signed
+            return self._coder.decode(bytearray(frame))
+        kind, ordered, fields = self._plain[number]
+        payload = frame[HEADER_2:-CHECKSUM_BYTES].ljust(fields.size, b"\0")[: fields.size]
+        message = kind(*ordered(fields.unpack(payload)))
+        message._msgbuf = bytearray(frame)
+        message._payload = message._msgbuf[HEADER_1:-CHECKSUM_BYTES]
+        message._crc = int.from_bytes(frame[-CHECKSUM_BYTES:], "little")
+        message._header = self._header(number, frame[2], frame[3], frame[1], frame[4], frame[5], frame[6])
+        return message
 
 
 REAL32 = 9  # MAV_PARAM_TYPE

@@ -143,7 +143,8 @@ def upper_triangle(covariance: Array | None) -> list[float]:
     """A 6x6 covariance as its upper triangle, row by row (21 values); all NaN where it is unknown or not finite."""
     if covariance is None or not np.isfinite(covariance).all():
         return [NAN] * len(UPPER[0])
-    return [float(value) for value in np.asarray(covariance)[UPPER]]
+    triangle: list[float] = np.asarray(covariance)[UPPER].tolist()
+    return triangle
 
 
 def _in_body(covariance: Array | None, body_to_earth: Array) -> Array | None:

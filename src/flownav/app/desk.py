@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from flownav.app.jobs import COMMAND, Jobs
+from flownav.app.shelf import CAMPAIGN as PLAN
 from flownav.app.shelf import LOOKED_AT, Shelf
 from flownav.app.warm import Warm
 from flownav.core.errors import InputError
@@ -69,6 +70,8 @@ class Desk:
         """A question that is answered within a second: a GPS cut, a flight, a cloud of touchdowns."""
         if question.get("what") not in ASKED:
             raise InputError("no such question")
+        if question["what"] == "cloud" and not (self.shelf.path_of(str(question.get("file"))) / PLAN).is_file():
+            return {"flights": 0, "planned": 1, "landed": 0, "r95_m": None, "svg": "", "words": "is begun"}
         if "file" in question:
             question["path"] = str(self.shelf.existing(str(question["file"])))
         if question.get("sensor"):

@@ -23,7 +23,7 @@ export function show(main) {
   const which = choice("Requirement", SHIPPED, () => { own.hidden = Boolean(which.input.value); plan.replaceChildren(); });
   const scenario = choice("Scenario", SCENARIOS), measure = choice("Measure", MEASURES);
   const most = field("at most", 0.5, 0, 100), share = field("with probability [%]", 95, 1, 99.99);
-  const sure = field("shown with confidence [%]", 90, 1, 99.99), wind = field("wind at 20 ft up to [m/s]", 4, 0, 20);
+  const sure = field("shown with confidence [%]", 90, 1, 99.99), wind = field("wind at 20 ft [m/s]", 4, 0, 20);
   own.append(...[scenario, measure, most, share, sure, wind].map(({ box }) => box));
   own.hidden = true;
   let planned = null, flown = null, timer = 0, left = false;

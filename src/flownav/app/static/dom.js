@@ -17,11 +17,20 @@ export const el = (tag, properties = {}, ...children) => made(document.createEle
 export const svg = (tag, properties = {}, ...children) => made(document.createElementNS(SVG, tag), properties, children);
 export const button = (text, onclick, properties = {}) => el("button", { type: "button", onclick, ...properties }, text);
 
+// The pictures of a page name what clips them alike: each gets names of its own.
+let pictures = 0;
+function named(parsed) {
+  const own = `-${++pictures}`;
+  for (const clip of parsed.querySelectorAll("clipPath")) clip.id += own;
+  for (const part of parsed.querySelectorAll("[clip-path]")) part.setAttribute("clip-path", part.getAttribute("clip-path").replace(")", `${own})`));
+  return parsed;
+}
+
 // A picture that the reports' own functions drew, under its words.
 export function picture(text, words) {
   const holder = el("figure", { class: "picture" });
   const parsed = new DOMParser().parseFromString(text, "text/html").body.firstElementChild;
-  if (parsed) holder.append(document.adoptNode(parsed));
+  if (parsed) holder.append(named(document.adoptNode(parsed)));
   holder.append(el("figcaption", {}, words));
   return holder;
 }

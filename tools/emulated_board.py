@@ -17,7 +17,8 @@ from flownav.core.errors import FlownavError, InputError
 from flownav.core.measurement import Sensor
 from flownav.export.onboard.interface import Rates
 from flownav.export.onboard.library_boards import EmulatedBoard
-from flownav.export.onboard.package import manifest_of, pace_of, packed_settings, readings_of
+from flownav.export.onboard.manifest import manifest_of
+from flownav.export.onboard.package import pace_of, packed_settings, readings_of
 from flownav.export.onboard.targets import LIBRARY
 from flownav.navigation.rings import Given
 

@@ -135,3 +135,18 @@ def test_an_index_of_too_few_rows_is_no_figure():
     ]
     nothing = ["rank      too few rows to rank any input; give a larger --ranking"]
     assert _ranking({"ranking": [few, few], "split": [few]}) == nothing
+
+
+def test_a_plan_refuses_a_key_and_a_folder_that_a_flight_would_refuse(tmp_path):
+    """`--plan` took any, and the same command without it then stopped."""
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").write_text("years")
+    (tmp_path / "file").write_text("x")
+    (tmp_path / "link").symlink_to(tmp_path / "mine")
+    for name, why in (("mine", "holds no campaign"), ("file", "it is a file"), ("link", "through a symbolic link")):
+        done = run("approach", "--plan", "--out", tmp_path / name)
+        assert isinstance(done.exception, InputError)
+        assert why in str(done.exception)
+    assert isinstance(run("approach", "--plan", "--sign", tmp_path / "absent.pem").exception, InputError)
+    assert run("approach", "--plan", "--out", tmp_path / "new").exception is None
+    assert not (tmp_path / "new").exists()

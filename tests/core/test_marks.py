@@ -58,7 +58,7 @@ def test_what_a_user_wrote_about_flownav_is_not_replaced(tmp_path, name):
 
 
 @pytest.mark.parametrize(
-    "name", ["bytes.ulg", "logged.ulg", "other.png", "other.mcap", "other.rrd", "web.zip", "notes.zip"]
+    "name", ["bytes.ulg", "logged.ulg", "other.png", "other.mcap", "other.rrd", "web.zip", "notes.zip", "data.zip"]
 )
 def test_nor_is_what_another_tool_made(tmp_path, name):
     path = tmp_path / name
@@ -76,7 +76,8 @@ def test_nor_is_what_another_tool_made(tmp_path, name):
         path.write_bytes(b"RRF2" + bytes(60) + b"\x1a\x0c\n\x0aflownav_is_mine")
     else:
         with zipfile.ZipFile(path, "w") as bundle:
-            bundle.writestr("manifest.json", '{"manifest_version": 3}' if name == "web.zip" else '{"schema": 1}')
+            manifest = {"web.zip": '{"manifest_version": 3}', "data.zip": '{\n "schema": 1,\n "title": "my points"}'}
+            bundle.writestr("manifest.json", manifest.get(name, '{"schema": 1}'))
             bundle.writestr("notes.txt" if name == "notes.zip" else "a.parquet", "flownav")
     assert not is_ours(path)
     with pytest.raises(InputError, match="was not written by flownav"):
@@ -158,6 +159,21 @@ def test_a_mark_is_at_a_fixed_place_and_holds_the_rest(tmp_path):
 def test_a_live_record_is_known_wherever_its_manifest_says_so(tmp_path):
     Record({"parameters": {f"n{k}": k for k in range(2000)}, "kind": "live"}).save(tmp_path / "x.fnr")
     assert not is_ours(tmp_path / "x.fnr")
+
+
+def test_a_record_that_was_put_together_again_is_not_flownavs(tmp_path):
+    path = tmp_path / "x.fnr"
+    Record({"kind": "fly"}, {"events": {"t_s": np.arange(2.0)}}).save(path)
+    assert is_ours(path)
+    with zipfile.ZipFile(path) as bundle:
+        parts = {name: bundle.read(name) for name in bundle.namelist()}
+    for named, order in ((True, sorted(parts)), (False, ["manifest.json", "events.parquet"])):
+        with zipfile.ZipFile(path, "w") as bundle:
+            for name in order:  # others in front, or the day of today
+                bundle.writestr(zipfile.ZipInfo(name) if named else name, parts[name])
+        assert not is_ours(path)
+        with pytest.raises(InputError, match="was not written by flownav"):
+            place(path, force=True)
 
 
 def test_another_file_signs_for_one_as_it_is(tmp_path):

@@ -19,10 +19,14 @@ from flownav.api.building import flight_of
 from flownav.cli.schemas import schema_of
 from flownav.core.errors import InputError
 from flownav.export.onboard import runs
-from flownav.export.onboard.package import manifest_of, pace_of, packed_settings, readings_of
+from flownav.export.onboard.interface import Rates
+from flownav.export.onboard.manifest import manifest_of
+from flownav.export.onboard.package import pace_of, packed_settings, readings_of
 from flownav.export.onboard.vectors import vectors_of
+from flownav.export.onboard.verify import logged_digests
 
 NATIVE = "linux-x86_64"
+RATES = Rates()._asdict()
 here = pytest.mark.skipif(sys.platform != "linux", reason="the library of this processor is one of Linux")
 
 
@@ -170,3 +174,83 @@ def test_constants_that_are_none(name, text, said, copy):
     (copy / name).write_text(text)
     with pytest.raises(InputError, match=said):
         vectors_of(copy)
+
+
+# -- a folder of somebody else -----------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("entry", "value"),
+    [
+        ("digests", "0123456789abcdef"),
+        ("digests", []),
+        ("digests", ["x"]),
+        ("digests", [7]),
+        ("files", ["main.c"]),
+        ("files", {"main.c": 1}),
+        ("rates", {}),
+        ("rates", {"imu_hz": 100.0}),
+        ("rates", {**RATES, "imu_hz": 1e12}),
+        ("rates", {**RATES, "horizon_s": 1e6}),
+        ("rates", {**RATES, "exposure_s": "long"}),
+        ("rates", {**RATES, "others_hz": float("nan")}),
+        ("without", "pad"),
+        ("lag", 2),
+        ("target", None),
+        ("build", 0),
+    ],
+)
+def test_a_manifest_that_states_what_cannot_be_is_one_line(entry, value, copy):
+    path = copy / "manifest.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {entry: value}))
+    with pytest.raises(InputError, match=rf"not a folder of `flownav build` \(manifest.json: {entry} is not as"):
+        flownav.verify(copy)
+
+
+@pytest.mark.parametrize("content", [b"", b"[]", b"\xff", b"[" * 100_000, b"{}", b" " * (5 << 20)])
+def test_a_manifest_that_is_none_is_one_line(content, copy):
+    (copy / "manifest.json").write_bytes(content)
+    with pytest.raises(InputError, match=r"manifest.json|not a folder of `flownav build`") as error:
+        flownav.verify(copy)
+    assert "\n" not in str(error.value)
+
+
+def test_code_that_the_manifest_does_not_name_is_named_and_not_run(copy):
+    path = copy / "manifest.json"
+    facts = json.loads(path.read_text())
+    del facts["files"]["main.c"]
+    path.write_text(json.dumps(facts))
+    (copy / "main.c").write_text("int main(void) { return 0; }\n")
+    (copy / "notes.txt").write_text("mine\n")
+    found = flownav.verify(copy)
+    assert (found["changed"], found["ran"], found["equal"]) == (["main.c"], [], False)
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "said"),
+    [
+        ("flownav_settings.c", ".horizon_s = 0.27", ".horizon_s = 0.2.7", r"could not convert string to float"),
+        ("flownav_settings.c", "  .horizon_s = 0.27,\n", "", r"\d+ numbers; the navigator has \d+"),
+        ("flownav_vectors.h", "\n};\n", ",\n {1.0, 99, " + "0, " * 11 + "0},\n};\n", "a reading is of no sensor"),
+        ("flownav_vectors.h", "\n};\n", ",\n {1.0, NAN, " + "0, " * 11 + "0},\n};\n", "a reading is of no sensor"),
+    ],
+)
+def test_constants_that_cannot_be(name, old, new, said, copy):
+    text = (copy / name).read_text()
+    width = 2 + len(vectors_of(copy).readings[0].numbers)
+    assert old in text
+    (copy / name).write_text(text.replace(old, new.replace("0, " * 11, "0, " * (width - 3)), 1))
+    with pytest.raises(InputError, match=said):
+        vectors_of(copy)
+
+
+@pytest.mark.parametrize("line", ["9" * 5000 + " 0123456789abcdef\n", "\u0661 0123456789abcdef\n"])
+def test_a_number_of_readings_that_is_none(line, tmp_path):
+    (tmp_path / "lines").write_text(line, encoding="utf-8")
+    with pytest.raises(InputError, match="no line of it is a number of readings"):
+        logged_digests(str(tmp_path / "lines"))
+
+
+def test_a_file_of_four_gigabytes_of_nothing_is_refused_by_its_size(tmp_path):
+    with (tmp_path / "lines").open("wb") as file:
+        file.truncate(4 << 30)
+    with pytest.raises(InputError, match="larger than 32 MB; cut it to the lines with digests"):
+        logged_digests(str(tmp_path / "lines"))

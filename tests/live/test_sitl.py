@@ -121,6 +121,30 @@ def test_flights_beside_each_other_have_slots_of_their_own(tmp_path, monkeypatch
         pass
 
 
+def test_a_lock_of_another_user_is_locked_by_reading_and_nothing_is_led_elsewhere(tmp_path, monkeypatch):
+    """In a folder that all share (/tmp) Linux lets nobody make another's file again, nor write to it."""
+    monkeypatch.setattr(campaign, "gettempdir", lambda: str(tmp_path))
+    lock = tmp_path / f"flownav-sitl-{campaign.FIRST_SLOT}.lock"
+    lock.touch(0o444)
+    asked = []
+    opens = os.open
+
+    def opened_so(path, flags, mode=0o777):
+        asked.append(flags)
+        return opens(path, flags, mode)
+
+    monkeypatch.setattr(campaign.os, "open", opened_so)
+    with a_slot() as first, a_slot() as second:
+        assert (first, second) == (campaign.FIRST_SLOT, campaign.FIRST_SLOT + 1)
+    assert not any(flags & (os.O_WRONLY | os.O_RDWR) for flags in asked)
+    assert not asked[0] & os.O_CREAT
+    lock.unlink()
+    lock.symlink_to(tmp_path / "somewhere")
+    with pytest.raises(InputError, match=r"flownav-sitl-1.lock: cannot be locked .*; remove it, or"):
+        a_slot().__enter__()
+    assert not (tmp_path / "somewhere").exists()
+
+
 # -- its tables --------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("make", PILOTS)
 def test_every_fault_does_something_and_ends(make):
@@ -299,6 +323,20 @@ def test_what_was_flown_is_not_flown_again(tmp_path, monkeypatch):
         assert len(list(flown(tasks, 1, steps.append))) == count
     assert flew == [0, 1, 2]
     assert len(steps) == 5
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", "[" * 100_000, "{}", '{"why": ""}'])
+def test_damaged_figures_and_a_damaged_plan_are_one_line(tmp_path, content):
+    orders = (Order("ardupilot", "hover", Case("heli", "cut", seed=1)),)
+    (task,) = tasks_of([Cell("heli", orders)], tmp_path / "program", tmp_path)
+    task.path.parent.mkdir(parents=True)
+    task.path.write_text(content)
+    with pytest.raises(InputError, match=r"flight.json: .*; remove it, and the flight is flown again"):
+        list(flown([task], 1, lambda done: None))
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / campaign.PLAN).write_text(content)
+    with pytest.raises(InputError, match="give another name, or move it away"):
+        opened(tmp_path / "out", {"vehicle": "heli", "flights": 1})
 
 
 def test_the_line_loses_what_it_is_told_to_lose():

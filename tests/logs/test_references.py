@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from flownav.core.measurement import Sensor, Stream
 from flownav.core.record import POSITION_NED
+from flownav.logs import open_log as opening
 from flownav.logs.open_log import open_log
 from flownav.logs.references import examined, of_one_origin, upside_down
 from replay_logs import log_of_flight
@@ -82,6 +85,35 @@ def test_one_that_leaps_about_is_left_as_it_is_and_said():
     found, notes = examined(truth, "x")
     assert found is truth
     assert notes[0].startswith("x leaps about (")
+
+
+@pytest.mark.parametrize("by", [1e9, 3e38, np.inf, np.nan])
+def test_half_of_the_rows_that_can_be_no_place_are_left_out(by):
+    """They were more than a fifth, so that all stayed and the score was 7e8 m rms."""
+    truth, notes = examined(table(changed(slice(200, None), by)), "x")
+    assert np.array_equal(path_of(truth), PATH[:200])
+    assert notes == ("x: 200 rows are far from the others and left out, at 20.00, 20.10, 20.20 s and later",)
+    position = changed(slice(200, None), by)
+    position[:200] += 50.0 * (np.arange(200) % 4 < 2)[:, None]
+    truth, notes = examined(table(position), "x")
+    assert np.array_equal(path_of(truth), position[:200])
+    assert notes[0].startswith("x leaps about (")
+
+
+def test_a_reference_without_any_place_is_left_out(tmp_path):
+    truth, notes = examined(table(changed(slice(None), 3e38)), "x")
+    assert not len(truth["t_s"])
+    assert notes[0].startswith("x: 400 rows are far from")
+    made = log_of_flight(10.0)
+    every = slice(None, None, 100)
+    place = {name: column + 3e4 for name, column in zip(("x_m", "y_m", "z_m"), made.position[every].T, strict=True)}
+    made.tables["truth"] = {"t_s": made.t_s[every]} | place
+    log = replace(open_log(made.write(tmp_path / "log")), truth=table(changed(slice(None), 3e38)))
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(opening, "_read", lambda *_: log)
+        found = open_log(tmp_path / "log")
+    assert found.truth is None
+    assert found.notes[-1] == ("truth.csv is left out: none of its rows is a place within 100 km; metres are needed")
 
 
 def test_a_log_says_it_and_has_the_path(tmp_path):

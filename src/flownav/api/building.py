@@ -151,9 +151,9 @@ def _folder_verified(folder: Path, record: str | Path | None) -> dict[str, Any]:
     Code that was changed since is not run.
     """
     from flownav.export.onboard.constants import VECTORS_A_DIGEST
-    from flownav.export.onboard.package import manifest_of
+    from flownav.export.onboard.manifest import changed_files, manifest_of
     from flownav.export.onboard.runs import runs_of
-    from flownav.export.onboard.verify import LoggedDigest, changed_files, compare, passed_to
+    from flownav.export.onboard.verify import LoggedDigest, compare, passed_to
 
     manifest = manifest_of(folder)
     digests = [int(digest, 16) for digest in manifest["digests"]]

@@ -9,6 +9,7 @@ from flownav.cli import options
 from flownav.cli.options import argument, option, out_option, switch
 from flownav.cli.output import Column, answer, figure, progress, require_between, say, table_of
 from flownav.core.errors import InputError, VerdictError
+from flownav.core.guard import an_output_folder
 from flownav.core.text import key_words
 
 if TYPE_CHECKING:
@@ -75,6 +76,7 @@ def command(
     from flownav.campaigns.ranking import LEAST_ROWS, MOST_ROWS
     from flownav.campaigns.requirement import load_requirement
     from flownav.campaigns.run import engine_named, require_engine
+    from flownav.campaigns.store import Store
 
     require_between("--again", again, 1, MOST_FLIGHTS)
     if verify is not None:
@@ -92,12 +94,14 @@ def command(
     require_engine(engine)
     asked = load_requirement(requirement)
     plan = plan_of(asked, flights, vehicle)
-    if plan_only:
+    signer = None if sign is None else private_key(sign)
+    if plan_only:  # what cannot be flown, signed or written is refused here, as it is without --plan
         for cell in range(len(plan.cells)):
-            plan.ready(cell)  # what cannot be flown is refused here, as it is without --plan
+            plan.ready(cell)
+        if out is not None:
+            Store(an_output_folder(out)).check(plan.as_json)
         _say_plan(asked, as_json)
         return
-    signer = None if sign is None else private_key(sign)
     folder = out or Path("out") / f"{asked.name}_certificate"
     how = How(engine_named(engine), ranking, records, again, signer)
     facts = _fly(asked, plan, how, requirement, folder)

@@ -24,7 +24,7 @@ KINDS = (
     (stat.S_ISCHR, "a device"),
     (stat.S_ISBLK, "a device"),
 )
-MOST_JSON_BYTES = 64 << 20  # of a file that we wrote ourselves
+MOST_JSON_BYTES = 4 << 20  # of a file that we wrote ourselves; lists in it take thirty times as much memory
 LONGEST_SHOWN = 200  # characters of a name in a message
 READ_IN_FOLDERS = {".csv", ".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm"}  # by those who take a folder
 RIG = "rig.toml"

@@ -31,6 +31,9 @@ PAGE_MARK_ENDS, DIGEST_LETTERS = '">', 64
 LOOKED_AT_BYTES = 4096
 MOST_JSON_BYTES = 4 << 20
 MANIFEST, TABLE = "manifest.json", ".parquet"
+RECORD_MARK = re.compile(  # first in its zip, as it is, of no date, and the schema first in it
+    rb"PK\x03\x04.{2}\x00\x00\x00\x00\x00\x00\x21\x00.{12}\x0d\x00\x00\x00manifest\.json\{\n \"schema\": \d", re.DOTALL
+)
 RECORD_MAGIC, ULOG_MAGIC, HEAD_ENDS = b"PK\x03\x04", b"ULog", (b"<title", b"</head", b"<body")
 ULOG_MARK = re.compile(rb"I.char\[\d{1,5}\] flownav_record", re.DOTALL)  # an information message of this key
 HEADERS = (  # at a file's first byte
@@ -93,7 +96,7 @@ def is_ours(path: Path) -> bool:
                 return any(header.match(head) for header in HEADERS) or _is_our_page(head, file)
     except OSError:
         return False
-    manifest = manifest_of(path)
+    manifest = manifest_of(path) if RECORD_MARK.match(head) else None
     return manifest is not None and manifest.get("kind") != "live"  # no command makes a live session again
 
 

@@ -47,6 +47,11 @@ def upside_down(truth: Table, streams: Mapping[Sensor, Stream]) -> str:
     return ""
 
 
+def _rows(table: Table, kept: NDArray[np.bool_]) -> Table:
+    """The table without some of its rows; itself where all are kept."""
+    return table if kept.all() else {key: np.asarray(column)[kept] for key, column in table.items()}
+
+
 class Leap(NamedTuple):
     """When a path leaps [s], and by what beside its own motion, north, east, down [m]."""
 
@@ -55,7 +60,8 @@ class Leap(NamedTuple):
 
 
 def examined(truth: Table, name: str) -> tuple[Table, tuple[str, ...]]:
-    """A reference without strays and leaps, and a note on each kind; the table itself where there are none.
+    """A reference without strays and leaps, and a note on each kind; the table itself where there are none. Rows that
+    can be no place are left out, however many they are.
 
     truth: columns t_s and POSITION_NED at least, in order of time. name: of the reference, for the notes.
     """
@@ -64,9 +70,12 @@ def examined(truth: Table, name: str) -> tuple[Table, tuple[str, ...]]:
     possible = np.isfinite(position).all(axis=1) & (np.abs(position) <= FARTHEST_M).all(axis=1)
     kept = possible & ~_short_pieces(t_s, position, possible)
     strays = np.flatnonzero(~kept)
-    if len(strays) > MOST_STRAYS * len(t_s):
-        return truth, (f"{name} leaps about ({len(strays)} of its {len(t_s)} rows): errors against it mean little",)
-    table: Table = truth if not len(strays) else {key: np.asarray(column)[kept] for key, column in truth.items()}
+    if np.count_nonzero(possible & ~kept) > MOST_STRAYS * len(t_s):
+        about = f"{name} leaps about ({len(strays)} of its {len(t_s)} rows): errors against it mean little"
+        return _rows(truth, possible), (about,)
+    table = _rows(truth, kept)
+    if not kept.any():
+        return table, _of_strays(name, t_s[strays])
     leaps = lasting(leaps_of(t_s[kept], position[kept]), t_s[kept], position[kept])
     for leap in leaps:
         later = np.asarray(table["t_s"], float) >= leap.t_s

@@ -23,6 +23,7 @@ from flownav.export.onboard.code import WITHOUT, machine_code
 from flownav.export.onboard.constants import VECTORS, digests_of, number, settings_file, vectors_file
 from flownav.export.onboard.elf import image_of, read_object, shared_object
 from flownav.export.onboard.interface import ABI, SYMBOLS, Rates, header, script
+from flownav.export.onboard.manifest import MANIFEST, require_own
 from flownav.export.onboard.page import page_of
 from flownav.logs.log import FedSegment
 from flownav.navigation import progress, waiting
@@ -33,8 +34,6 @@ from flownav.navigation.rings import Given, given_of
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tape import empty_tape
 from flownav.navigation.waiting_records import Sizes
-
-MANIFEST = "manifest.json"
 
 
 @dataclass(frozen=True)
@@ -186,24 +185,6 @@ def build(asked: Asked, flight: Flight, out: Path, *, force: bool = False) -> di
         shutil.rmtree(out)
         place.rename(out)
     return facts
-
-
-def require_own(folder: Path) -> None:
-    """InputError where a folder holds what `flownav build` did not write."""
-    own = {MANIFEST, *manifest_of(folder)["files"]}
-    if strange := sorted({path.name for path in folder.iterdir()} - own):
-        raise InputError(f"{folder}: {strange[0]} is not of `flownav build`; give another name, or move it away")
-
-
-def manifest_of(folder: Path) -> dict[str, Any]:
-    """A folder's manifest. InputError where it is none of `flownav build`."""
-    try:
-        found: dict[str, Any] = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-        for name in ("files", "build", "target", "rates", "without", "lag", "digests"):
-            found[name]
-        return found
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{folder}: not a folder of `flownav build` ({MANIFEST}: {error})") from error
 
 
 def _packed(asked: Asked, code: Code) -> dict[str, bytes]:

@@ -1,13 +1,13 @@
 """`flownav verify`: the output of a board or a browser for a flight, compared with the same flight computed here."""
 
-import hashlib
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from flownav.core.errors import InputError
+from flownav.core.guard import an_input
 from flownav.core.measurement import Sensor
 from flownav.export.onboard.board import Board
 from flownav.export.onboard.interface import Rates
@@ -16,8 +16,8 @@ from flownav.export.onboard.vectors import vectors_of
 from flownav.navigation.rings import Given
 
 DIGEST = re.compile(r"[0-9a-fA-F]{16}")
-LINE = re.compile(r"\s*(\d+)\s+(?:0x)?([0-9a-fA-F]{16})\b")
-MOST_LINES = 1_000_000
+LINE = re.compile(r"\s*(\d{1,12})\s+(?:0x)?([0-9a-fA-F]{16})\b", re.ASCII)
+MOST_LINES, MOST_BYTES = 1_000_000, 32 << 20
 
 
 class LoggedDigest(NamedTuple):
@@ -56,7 +56,9 @@ def logged_digests(what: str) -> list[LoggedDigest]:
         raise InputError(
             f"{what}: neither 16 hexadecimal digits, nor a file of digests, nor a folder of `flownav build`"
         )
-    text = path.read_text(encoding="utf-8", errors="replace")
+    if path.stat().st_size > MOST_BYTES:
+        raise InputError(f"{what}: larger than {MOST_BYTES >> 20} MB; cut it to the lines with digests")
+    text = an_input(path).read_text(encoding="utf-8", errors="replace")
     found = [LoggedDigest(int(m[1]), int(m[2], 16)) for m in map(LINE.match, text.splitlines()[:MOST_LINES]) if m]
     if not found:
         raise InputError(f"{what}: no line of it is a number of readings and 16 hexadecimal digits")
@@ -105,14 +107,6 @@ def verified(logged: Sequence[LoggedDigest], flight: Flight, rates: Rates) -> Fo
 
 
 # -- a folder -------------------------------------------------------------------------------------------------
-def changed_files(folder: Path, manifest: dict[str, Any]) -> Iterator[str]:
-    """Files that are not as they were written."""
-    for name, digest in manifest["files"].items():
-        file = folder / Path(name).name
-        if not file.is_file() or hashlib.sha256(file.read_bytes()).hexdigest() != digest:
-            yield name
-
-
 def passed_to(folder: Path, manifest: dict[str, Any], flight: Flight | None) -> tuple[list[Given], Board]:
     """Readings, and the board here that takes them: those of a flight, or the folder's own vectors and settings."""
     rates, without = Rates(**manifest["rates"]), tuple(manifest["without"])

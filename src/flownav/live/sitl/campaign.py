@@ -6,7 +6,7 @@ import os
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import gettempdir
@@ -16,6 +16,7 @@ import numpy as np
 
 from flownav.core.errors import InputError, arg
 from flownav.core.files import written_whole
+from flownav.core.guard import object_in
 from flownav.core.text import finite
 from flownav.live.sitl.flight import Order, fly
 from flownav.live.sitl.score import figures
@@ -91,7 +92,8 @@ def opened(folder: Path, plan: dict[str, Any]) -> None:
             raise InputError(
                 f"{arg('out')} {folder}: is there and holds no flights of `flownav sitl`; give another name"
             )
-        if json.loads(known.read_text()) | {"flights": 0} != json.loads(json.dumps(plan)) | {"flights": 0}:
+        found, asked = object_in(known, "give another name, or move it away"), json.loads(json.dumps(plan))
+        if found | {"flights": 0} != asked | {"flights": 0}:
             raise InputError(f"{arg('out')} {folder}: holds other flights; give another name, or move it away")
     with written_whole(folder / PLAN) as temporary:
         temporary.write_text(json.dumps(plan, indent=1) + "\n")
@@ -103,7 +105,7 @@ def flown(tasks: Sequence[Task], beside: int, done: Callable[[int], None]) -> It
     for task in tasks:
         if task.path.is_file():
             done(1)
-            yield task, json.loads(task.path.read_text())
+            yield task, _figures_in(task.path)
         else:
             left.append(task)
     if beside == 1 or len(left) < 2:
@@ -118,11 +120,20 @@ def flown(tasks: Sequence[Task], beside: int, done: Callable[[int], None]) -> It
             yield waiting[ended], ended.result()
 
 
+def _figures_in(path: Path) -> dict[str, Any]:
+    """Figures of a flight that was flown before. InputError where they are none."""
+    advice = "remove it, and the flight is flown again"
+    found = object_in(path, advice)
+    if not isinstance(found.get("landed"), bool):
+        raise InputError(f"{path}: holds no figures of a flight; {advice}")
+    return found
+
+
 @contextmanager
 def a_slot() -> Iterator[int]:
     """A number that no other flight on this machine has now: simulators take their ports by it."""
     for number in range(FIRST_SLOT, MOST_SLOT + 1):
-        held = os.open(Path(gettempdir()) / f"flownav-sitl-{number}.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        held = _lock(Path(gettempdir()) / f"flownav-sitl-{number}.lock")
         try:
             fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
@@ -134,6 +145,20 @@ def a_slot() -> Iterator[int]:
             os.close(held)
         return
     raise InputError(f"{MOST_SLOT} simulators already fly on this machine; wait for one")
+
+
+def _lock(path: Path) -> int:
+    """A file to lock, opened to read: another user's cannot be written, nor made again in a folder that all share.
+
+    InputError where it cannot be opened.
+    """
+    flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+    try:
+        with suppress(FileNotFoundError):
+            return os.open(path, flags)
+        return os.open(path, flags | os.O_CREAT, 0o644)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be locked ({error.strerror}); remove it, or name another TMPDIR") from error
 
 
 def _one(task: Task) -> dict[str, Any]:
@@ -185,7 +210,7 @@ def row_of(cell: str, flights: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "cell": cell,
         "flights": len(flights),
         "landed": sum(bool(flight["landed"]) for flight in flights),
-        "not_flown": [flight["why"] for flight in flights if flight["why"]],
+        "not_flown": [flight["why"] for flight in flights if flight.get("why")],
         "touchdown_r95_m": float(np.quantile(touched, 0.95, method="higher")) if touched else None,
         "touchdown_m": _median_and_worst(touched),
         "cpu_share": _median_and_worst([flight["cpu_share"] for flight in flights if flight.get("cpu_share")]),

@@ -13,6 +13,7 @@ import flownav
 from command import run
 from flownav.cli.schemas import schema_of
 from flownav.report.html import render
+from mavlink_logs import flight_log
 from planted.planted import written
 from planted_logs import fault, sound
 
@@ -86,3 +87,9 @@ def test_a_log_that_is_none_is_one_line(tmp_path, log, words):
 def test_python_refuses_an_unknown_autopilot(turned):
     with pytest.raises(flownav.InputError, match="px4, ardupilot or inav"):
         flownav.explain(turned, autopilot="betaflight")
+
+
+def test_a_hover_whose_flow_follows_nothing_has_no_turn_to_try_back(tmp_path):
+    """The fit of its flow to its motion is singular: it moves along one axis."""
+    found = flownav.explain(flight_log(12.0).write(tmp_path / "hover.tlog"))
+    assert found.checked

@@ -86,10 +86,9 @@ def _cut(one: Stream, kept: Flags) -> Stream:
 def turned_back(case: Case, sign: Sign) -> Repair:
     """The flow's axes turned back, its gyro's with them."""
     one = case.log.streams[Sensor.FLOW_RATE]
-    matrix = np.linalg.inv(case.flow_fit.matrix) if case.flow_fit is not None else np.eye(2)
-    u, _, v = np.linalg.svd(matrix)
+    u, _, v = np.linalg.svd(case.flow_fit.matrix if case.flow_fit is not None else np.eye(2))
     value = one.value.copy()
-    value[:, :2] = value[:, :2] @ (u @ v).T
+    value[:, :2] = value[:, :2] @ (u @ v)  # by the transpose of the turn nearest to the fit, which may be singular
     value[:, 2:4] = np.nan  # the vehicle's own rates serve
     return _with(case, "flow turned back, the vehicle's gyro", replace(one, value=value))
 

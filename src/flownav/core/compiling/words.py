@@ -46,7 +46,7 @@ def word_of(value: Any) -> str:
     if value is None:
         return "none"
     if isinstance(value, tuple):
-        return _opening(kind) + ", ".join(map(word_of, value)) + "]"
+        return _opening(kind) + ", ".join(map(word_of, value)) + "]"  # type: ignore[arg-type]  # mypy: a class has no hash
     if isinstance(value, np.generic) and value.dtype.kind in NUMBERS and value.dtype.isnative:
         return str(value.dtype)
     raise _UnknownError

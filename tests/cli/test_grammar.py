@@ -257,7 +257,7 @@ main()
 """
 
 
-@pytest.mark.parametrize("module", ["flownav.cli", "typer", "flownav.cli.fly", "flownav.api.calls", "llvmlite"])
+@pytest.mark.parametrize("module", ["flownav.cli", "typer", "flownav.cli.fly", "flownav.api.calls", "numpy"])
 def test_an_interrupt_while_modules_are_loaded_ends_without_a_word(module, tmp_path):
     asked = [sys.executable, "-c", INTERRUPTED, module, "fly", "landing", "--out", str(tmp_path / "x.fnr")]
     done = subprocess.run(asked, capture_output=True, text=True)

@@ -140,12 +140,7 @@ class Lags:
 
     def horizon_s(self, least_s: float, margin_s: float, most_s: float) -> float:
         """The time to wait [s]: the greatest lag and a margin, at least `least_s` and at most `most_s`."""
-        oldest_s = self._newest_s - PATIENT_WINDOWS * WINDOW_S
-        greatest_s = 0.0
-        for windows in self._windows.values():
-            if windows[-1][0] >= oldest_s:
-                greatest_s = max(greatest_s, *[lag_s for _, lag_s in windows])
-        return min(max(least_s, greatest_s + margin_s), most_s)
+        return min(max(least_s, max(self.by_sensor.values(), default=0.0) + margin_s), most_s)
 
 
 class Refused(NamedTuple):

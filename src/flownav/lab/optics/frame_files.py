@@ -87,7 +87,7 @@ def _video(path: Path) -> NDArray[np.uint8]:
         ) from None
     try:
         with av.open(str(an_input(path))) as container:
-            frames = []
+            frames: list[NDArray[np.uint8]] = []
             for frame in container.decode(video=0):
                 if frame.width * frame.height * (len(frames) + 1) > LARGEST_FRAMES_BYTES:
                     raise InputError(f"{path}: its frames do not fit in memory; cut it into pieces, or make it smaller")

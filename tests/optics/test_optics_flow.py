@@ -187,15 +187,20 @@ def test_a_small_film_of_frames_without_end_is_refused_while_it_is_read(
             pass
 
         def decode(self, video: int) -> Iterator[Frame]:
-            return repeat(Frame()) if self.endless else iter([Frame()] * 3)
+            return map(self.counted, repeat(Frame())) if self.endless else iter([Frame()] * 3)
 
-        endless = True
+        def counted(self, frame: Frame) -> Frame:
+            self.decoded += 1
+            return frame
+
+        endless, decoded = True, 0
 
     made = Film()
     monkeypatch.setitem(sys.modules, "av", SimpleNamespace(open=lambda name: made))
     monkeypatch.setattr(frame_files, "LARGEST_FRAMES_BYTES", 50 * 300 * 200)
     with pytest.raises(InputError, match=r"x.mp4: its frames do not fit in memory; cut it into pieces"):
         read_frames([tmp_path / "x.mp4"])
+    assert made.decoded == 51
     made.endless = False
     assert read_frames([tmp_path / "x.mp4"]).shape == (3, 200, 300)
 

@@ -152,6 +152,8 @@ def _checked_members(bundle: zipfile.ZipFile, size: int) -> list[str]:
     if wrong or len(set(names)) < len(names) or len(names) > MOST_MEMBERS:
         raise ValueError(f"it holds {wrong[0]!r}" if wrong else "its parts are too many, or two have one name")
     for member in found:
+        if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise ValueError(f"{member.filename} is packed in a way that no record is")
         if member.file_size > (MOST_MANIFEST if member.filename == MANIFEST else _allowed(size)):
             raise ValueError(f"{member.filename} would be {member.file_size} bytes")
     if sum(member.file_size for member in found) > _allowed(size):

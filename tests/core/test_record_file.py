@@ -134,6 +134,15 @@ def test_a_name_that_is_not_utf8_is_refused(tmp_path):
     refusal(bundle(tmp_path / "y.fnr", {"truth.parquet": table.replace("\u00fcber".encode(), b"\xff\xfeber")}))
 
 
+def test_an_integer_of_many_digits_is_one_line(tmp_path):
+    path = tmp_path / "x.fnr"
+    Record({"seed": 2**64 - 1}).save(path)
+    assert Record.load(path).manifest["seed"] == 2**64 - 1
+    Record({"seed": 10**400}).save(path)
+    with pytest.raises(InputError, match=r"manifest.json: an integer of 401 digits"):
+        Record.load(path)
+
+
 @pytest.mark.parametrize("packed", [zipfile.ZIP_LZMA, zipfile.ZIP_BZIP2])
 @pytest.mark.parametrize("damage", [0, 1])
 def test_a_record_that_is_packed_otherwise_is_refused_whatever_its_bytes(tmp_path, packed, damage):

@@ -19,6 +19,7 @@ import pytest
 
 from command import run
 from flownav.core.errors import InputError
+from flownav.core.marks import manifest_of
 from flownav.core.record import Record
 from flownav.core.record_file import ALWAYS_BYTES, MOST_BYTES, MOST_GROWTH, MOST_MANIFEST, _allowed
 from flownav.logs.open_log import open_flight
@@ -131,6 +132,35 @@ def test_a_name_that_is_not_utf8_is_refused(tmp_path):
     refusal(path)
     table = parquet({"t_s": T_S, "\u00fcber": T_S}, store_schema=False)
     refusal(bundle(tmp_path / "y.fnr", {"truth.parquet": table.replace("\u00fcber".encode(), b"\xff\xfeber")}))
+
+
+def test_an_integer_of_many_digits_is_one_line(tmp_path):
+    path = tmp_path / "x.fnr"
+    Record({"seed": 2**64 - 1}).save(path)
+    assert Record.load(path).manifest["seed"] == 2**64 - 1
+    Record({"seed": 10**400}).save(path)
+    with pytest.raises(InputError, match=r"manifest.json: an integer of 401 digits"):
+        Record.load(path)
+
+
+@pytest.mark.parametrize("packed", [zipfile.ZIP_LZMA, zipfile.ZIP_BZIP2])
+@pytest.mark.parametrize("damage", [0, 1])
+def test_a_record_that_is_packed_otherwise_is_refused_whatever_its_bytes(tmp_path, packed, damage):
+    """A damaged part that LZMA has packed raised LZMAError, which is no error of zip files."""
+    path = tmp_path / "x.fnr"
+    Record({"kind": "fly"}, {"events": {"t_s": np.arange(2.0)}}).save(path)
+    with zipfile.ZipFile(path) as written:
+        parts = {name: written.read(name) for name in written.namelist()}
+    with zipfile.ZipFile(path, "w", packed) as again:
+        for name, content in parts.items():
+            again.writestr(name, content)
+    content = bytearray(path.read_bytes())
+    place = content.index(b"manifest.json") + 40
+    content[place : place + 20] = bytes(byte ^ (255 * damage) for byte in content[place : place + 20])
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=r"manifest.json is packed in a way that no record is"):
+        Record.load(path)
+    assert manifest_of(path) is None
 
 
 def test_columns_whose_lengths_differ_are_refused(tmp_path):

@@ -7,8 +7,9 @@ import pytest
 
 from fed_records import FLOWN, queue_of_flight, record_of
 from flownav.core.errors import InputError
-from flownav.core.measurement import Sensor, merge
+from flownav.core.measurement import Sensor, Stream, merge
 from flownav.logs.open_log import open_flight
+from flownav.logs.plausible import check_values
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
@@ -76,6 +77,18 @@ def test_a_row_that_no_navigator_was_fed_is_one_line(tmp_path, name, value, said
     record.save(tmp_path / "x.fnr")
     with pytest.raises(InputError, match=said):
         open_flight(tmp_path / "x.fnr")
+
+
+@pytest.mark.parametrize(("length", "sound"), [(1.09, True), (1.11, False), (0.89, False), (0.91, True)])
+def test_a_quaternion_is_as_long_as_in_other_logs(tmp_path, length, sound):
+    value = np.zeros((3, 4))
+    value[:, 0] = 1.0, length, 1.0
+    streams = {Sensor.ATTITUDE: Stream.of(Sensor.ATTITUDE, np.arange(3.0), value)}
+    if sound:
+        check_values(tmp_path, streams)
+        return
+    with pytest.raises(InputError, match="attitude: a quaternion whose length is far from 1"):
+        check_values(tmp_path, streams)
 
 
 @pytest.mark.parametrize(

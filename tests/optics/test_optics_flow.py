@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Iterator
+from itertools import repeat
 from pathlib import Path
+from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -13,6 +17,7 @@ from typer.testing import CliRunner
 
 from flownav.cli import identify as flow_command
 from flownav.core.errors import InputError
+from flownav.lab.optics import frame_files
 from flownav.lab.optics.camera import Camera, effective_focal_px
 from flownav.lab.optics.firmware import VERSIONS, firmware_named
 from flownav.lab.optics.flow import compensated, flow_of_frames
@@ -20,6 +25,7 @@ from flownav.lab.optics.frame_files import binned, middle, read_frames
 from flownav.lab.optics.pad import texture
 from flownav.lab.optics.projection import pose_looking_down
 from flownav.lab.optics.render import film
+from fuzzing import peak_bytes
 from optical_oracles import CameraMotion, motion_field
 
 FPS = 250.0
@@ -149,6 +155,54 @@ def test_files_that_cannot_be_frames_are_named(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setitem(sys.modules, "PIL", None)
     with pytest.raises(InputError, match=r"pictures need Pillow: pip install 'flownav\[pictures\]'"):
         read_frames([tmp_path])
+
+
+def test_a_small_file_of_a_huge_picture_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    image.new("1", (8000, 6000)).save(tmp_path / "a.png", compress_level=9)
+    assert (tmp_path / "a.png").stat().st_size < 100_000
+    before = peak_bytes(anew=True)
+    with pytest.raises(InputError, match=r"a.png: 8000x6000 pixels; at most 32,000,000 are read"):
+        read_frames([tmp_path])
+    assert peak_bytes() - before < 30 << 20
+    image.new("1", (100, 60)).save(tmp_path / "a.png")
+    assert read_frames([tmp_path]).shape == (1, 60, 100)
+
+
+def test_a_small_film_of_frames_without_end_is_refused_while_it_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Frame(NamedTuple):
+        width: int = 300
+        height: int = 200
+
+        def to_ndarray(self, format: str) -> np.ndarray:
+            return np.zeros((self.height, self.width), np.uint8)
+
+    class Film:
+        def __enter__(self) -> Film:
+            return self
+
+        def __exit__(self, *error: object) -> None:
+            pass
+
+        def decode(self, video: int) -> Iterator[Frame]:
+            return map(self.counted, repeat(Frame())) if self.endless else iter([Frame()] * 3)
+
+        def counted(self, frame: Frame) -> Frame:
+            self.decoded += 1
+            return frame
+
+        endless, decoded = True, 0
+
+    made = Film()
+    monkeypatch.setitem(sys.modules, "av", SimpleNamespace(open=lambda name: made))
+    monkeypatch.setattr(frame_files, "LARGEST_FRAMES_BYTES", 50 * 300 * 200)
+    with pytest.raises(InputError, match=r"x.mp4: its frames do not fit in memory; cut it into pieces"):
+        read_frames([tmp_path / "x.mp4"])
+    assert made.decoded == 51
+    made.endless = False
+    assert read_frames([tmp_path / "x.mp4"]).shape == (3, 200, 300)
 
 
 def test_frames_can_be_binned_and_cut() -> None:

@@ -21,7 +21,7 @@ from flownav.core.record import Record
 from flownav.report.figures_innovation import innovations
 from flownav.report.figures_states import position
 from flownav.report.html import render, write_report
-from flownav.report.tables import NONE, sensor_rows
+from flownav.report.tables import NONE, rejected_rows, sensor_rows
 from report_records import flight, navigated, replay
 
 
@@ -129,6 +129,26 @@ def test_sensors_are_judged_in_words_and_the_drift_at_the_end_is_told() -> None:
     for told in ("--to ulog</code> for PlotJuggler", "--to foxglove</code> for Foxglove", "flownav view RECORD.fnr"):
         assert told in page
     assert sensor_rows(Record()) == []
+
+
+@pytest.mark.parametrize("value", [{}, [], "many", None, 10**400, -(10**400), float("inf")])
+def test_scores_of_a_manifest_that_are_no_numbers_are_dashes(value):
+    """A record from elsewhere: a page is written all the same."""
+    whole, count = {"rejected": {"gate": value}, "read": value}, {"gate": 3, "other": value}
+    record = Record(
+        {
+            "scores": {
+                "rejected": {"gps": count, "range": value},
+                "readings": {"gps": whole},
+                "coverage": {"gps": {"t0": value, "t1": 2.0}},
+                "consistency": {"gps": {"nis_per_dof": value, "samples": value, "refused": 0.5}},
+            }
+        }
+    )
+    rows = rejected_rows(record)
+    assert ("gps", "gate") in [row[:2] for row in rows]
+    (row,) = sensor_rows(record)
+    assert row[1] == f"{NONE} to 2.0"
 
 
 def test_without_a_paper_table_the_scores_stand_alone() -> None:

@@ -117,6 +117,8 @@ def manifest_of(path: Path) -> dict[str, Any] | None:
             names = bundle.namelist()
             if MANIFEST not in names or not all(name == MANIFEST or name.endswith(TABLE) for name in names):
                 return None
+            if bundle.getinfo(MANIFEST).compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                return None  # each other way of packing has errors of its own
             with bundle.open(MANIFEST) as file:
                 parsed = json.loads(file.read(MOST_JSON_BYTES))
     except ZIP_ERRORS:

@@ -32,6 +32,7 @@ MEMBER = re.compile(r"[A-Za-z0-9_-]{1,64}\.parquet")
 MOST_MEMBERS = 100
 MOST_DIRECTORY = 1 << 18  # bytes of the zip's directory
 MOST_MANIFEST = 4 << 20
+MOST_DIGITS = 40  # of an integer
 MOST_COLUMNS = 1000
 MOST_BYTES = 8 << 30  # of all tables in memory
 ALWAYS_BYTES = 64 << 20  # whatever the file's size
@@ -152,6 +153,8 @@ def _checked_members(bundle: zipfile.ZipFile, size: int) -> list[str]:
     if wrong or len(set(names)) < len(names) or len(names) > MOST_MEMBERS:
         raise ValueError(f"it holds {wrong[0]!r}" if wrong else "its parts are too many, or two have one name")
     for member in found:
+        if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise ValueError(f"{member.filename} is packed in a way that no record is")
         if member.file_size > (MOST_MANIFEST if member.filename == MANIFEST else _allowed(size)):
             raise ValueError(f"{member.filename} would be {member.file_size} bytes")
     if sum(member.file_size for member in found) > _allowed(size):
@@ -162,7 +165,7 @@ def _checked_members(bundle: zipfile.ZipFile, size: int) -> list[str]:
 def _manifest(text: bytes, path: Path, newest: int) -> dict[str, Any]:
     """The manifest as it stands, its keys checked."""
     try:
-        content = json.loads(text)
+        content = json.loads(text, parse_int=_whole_number)
     except RecursionError as error:
         raise ValueError(f"{MANIFEST} is nested too deep") from error
     if not isinstance(content, dict):
@@ -171,6 +174,13 @@ def _manifest(text: bytes, path: Path, newest: int) -> dict[str, Any]:
         raise InputError(f"{path}: record schema {content['schema']} is newer than this flownav; update flownav")
     check_manifest(content)
     return content
+
+
+def _whole_number(text: str) -> int:
+    """An integer of a manifest. ValueError where it is more than any count or seed."""
+    if len(text) > MOST_DIGITS:
+        raise ValueError(f"{MANIFEST}: an integer of {len(text)} digits")
+    return int(text)
 
 
 def check_manifest(content: Mapping[str, Any]) -> None:

@@ -224,7 +224,7 @@ def _ours(record: Record, shift_s: float) -> Contents:
             notes.append(f"{name}: rows without a time left out: {lost}")
     topics = [ulog.our_topic(record, path, shift_s) for path in paths]
     texts = {"flownav_record": str(record.manifest.get("scenario") or record.manifest.get("log") or "")}
-    if "innovation" in record.tables:
+    if {"sensor", "component"} <= record.tables.get("innovation", {}).keys():
         innovations, reasons = ulog.innovation_topics(record.tables["innovation"], shift_s)
         topics += innovations
         texts["flownav_reasons"] = ", ".join(f"{code} {reason}" for code, reason in enumerate(reasons))

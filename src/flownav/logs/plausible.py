@@ -15,6 +15,7 @@ from flownav.core.errors import InputError
 from flownav.core.frames import rotation_from_quaternion
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import LATEST_S, LONGEST_S
+from flownav.logs.assembly import UNIT_LENGTH_WITHIN
 from flownav.logs.log import attitude_at, attitude_rates, mean_over
 
 # beyond these, in a stream's own unit, a record is damaged: far more than what a live link or a simulation lets through
@@ -94,7 +95,8 @@ def check_values(where: Path, streams: dict[Sensor, Stream]) -> None:
         if beyond.any():
             worst = float(stream.value[beyond][0])
             raise InputError(f"{where}: {name}: a reading of {worst:g}; at most {LARGEST[sensor]:g} can be")
-        if sensor == Sensor.ATTITUDE and not np.all(abs(np.linalg.norm(stream.value, axis=1) - 1.0) < 0.5):
+        length = np.linalg.norm(stream.value, axis=1)
+        if sensor == Sensor.ATTITUDE and not np.all(abs(length - 1.0) < UNIT_LENGTH_WITHIN):
             raise InputError(f"{where}: attitude: a quaternion whose length is far from 1")
         if np.any((stream.variance < 0.0) | np.isinf(stream.variance)):
             raise InputError(f"{where}: {name}: a variance below 0, or infinite")

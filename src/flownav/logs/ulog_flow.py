@@ -111,7 +111,7 @@ def range_stream(topics: Topics, flow: Topic | None) -> Stream | None:
     if flow is None:
         return None
     distance_m = flow.matrix("distance_m" if flow.has("distance_m") else "ground_distance_m")
-    stated = np.isfinite(distance_m[:, 0]) & (distance_m[:, 0] > 0)
+    stated = (distance_m[:, 0] > 0.0) & (distance_m[:, 0] < FARTHEST_M)
     return Stream.of(Sensor.RANGE, flow.t_s[stated], distance_m[stated]) if stated.any() else None
 
 

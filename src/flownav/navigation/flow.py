@@ -13,6 +13,7 @@ from flownav.estimation.states import ATTITUDE, COMPASS, FLOW_SCALE, GROUND, GYR
 from flownav.navigation import calls
 from flownav.navigation.fault_signs import sign_flow
 from flownav.navigation.flow_judge import (
+    counted_agreement,
     gyro_share,
     hold_back,
     judge_look,
@@ -43,7 +44,7 @@ from flownav.navigation.memory import RANGE_MISSING, SCALE_UNSTATED, holds
 from flownav.navigation.offers import conclude, note_aid
 from flownav.navigation.packed import load_flow_settings
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT, component_of
-from flownav.navigation.records import FlowInnovation, FlowMemory, GpsMemory, Look, Reading
+from flownav.navigation.records import AGREEING, FlowInnovation, FlowMemory, GpsMemory, Look, Reading
 from flownav.navigation.tape import FLOW_DOUBTED, FLOW_TRUSTED, Output
 from flownav.navigation.trust import watch_whiteness
 from flownav.navigation.verdicts import (
@@ -60,7 +61,7 @@ from flownav.navigation.verdicts import (
 )
 from flownav.navigation.windows import watch_flow
 
-with_agreement = replacing(FlowMemory, "excess", "ratio", "likeness")
+with_agreement = replacing(FlowMemory, "excess", "ratio", "likeness", "agreed")
 with_verdict = replacing(FlowMemory, "taken_s", "doubted", "wrong_s", "usual")
 
 
@@ -117,18 +118,21 @@ def learn(
     tested: Tested, reading: Reading, before: FlowInnovation, m: FlowMemory, *, t_s: float, angular: bool,
     component: int, s: FlowSettings,
 ) -> FlowMemory:  # fmt: skip
-    """Agreement and excess noise from the component that was just tested."""
+    """Agreement and excess noise from the component that was just tested. A flow that waits (`hold_back`) teaches no
+    noise: garbage would widen the bound that it is held to.
+    """
     if tested.reason != FUSED and tested.reason != INNOVATION_GATE:
         return m
     innovation, total = tested.innovation, tested.total
     square = smaller(innovation * innovation, s.gate_sigma * s.gate_sigma * total) / total
     modelled = angular or not np.isfinite(component_of(reading, component)[1])
-    teaches = modelled and not blindness(reading.quality, m.usual) > 0.0
+    teaches = modelled and not blindness(reading.quality, m.usual) > 0.0 and m.agreed >= AGREEING
     return with_agreement(
         m,
         excess=followed_excess(innovation, before.innovation, tested.variance, t_s, m, s) if teaches else m.excess,
         ratio=followed_agreement(square, t_s, m),
         likeness=followed_likeness(alike(innovation, before.innovation, total), t_s, m),
+        agreed=counted_agreement(innovation - before.innovation, tested.variance, m),
     )
 
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.core.compile import cos, equation, exp, larger, replacing, smaller
+from flownav.core.compile import clamp, cos, equation, exp, larger, replacing, smaller
 from flownav.estimation.laws import lens_range
 from flownav.navigation import calls
 from flownav.navigation.flow_noise import LONGEST_STEP_S
@@ -23,6 +23,8 @@ from flownav.navigation.reasons import (
     usable_in_flight,
 )
 from flownav.navigation.records import (
+    AGREEING,
+    AidMemory,
     EchoMemory,
     FlowMemory,
     FlowSum,
@@ -41,6 +43,7 @@ with_reason = replacing(Look, "reason")
 with_scale = replacing(Look, "unscaled")
 with_values = replacing(Reading, "value_0", "value_1", "value_2", "value_3", "value_4", "value_5", "quality")
 with_arrival = replacing(Reading, "arrived")
+with_agreed = replacing(FlowMemory, "agreed")
 with_gyro = replacing(FlowMemory, "bias_x", "bias_y", "bias_count")
 
 LARGEST_SPREAD = 0.5  # of the height over the ground, of which flow makes no speed: chosen, not measured
@@ -49,6 +52,8 @@ DISPUTES_S = 0.3  # so long a range speaks of the height that flow is seen from:
 # A sensor that counts pixels carries the rest of a pixel over to the next look: so long a look sums such errors up to
 # none, where a filter that takes each look for white noise does not. A vehicle's velocity hardly changes meanwhile.
 LEAST_LOOK_S = 0.038
+BLIND_S = 5.0  # after as long without any aid a position is invalid (`invalid_s`)
+ALIKE_SIGMA = 2.5  # chosen: 1 of 80 components of sound flow is beyond it, most of what is random
 NEAR_LIMIT = 0.98  # a sensor at its limit reads the limit, whatever the flow: chosen, 2 % for rounding (test_judges)
 
 
@@ -180,7 +185,32 @@ def judge_scale(look: Look, gps: GpsMemory, m: FlowMemory, *, t_s: float) -> Loo
     return with_scale(look, unscaled=0.0 if holds(gps, t_s) and m.doubted == 0.0 else 1.0)
 
 
+class Held(NamedTuple):
+    """Whether a flow reading is tested and not fused, and the memory of the flow."""
+
+    held: HeldBack
+    flow: FlowMemory
+
+
 @on_lanes(calls.hold_back)
-def hold_back(gps: GpsMemory, m: FlowMemory, *, t_s: float) -> HeldBack:
-    """A flow that is wrong again and again is tested and not fused while GPS holds."""
-    return HeldBack(1.0 if holds(gps, t_s) and np.isfinite(m.wrong_s) else 0.0)
+def hold_back(look: Look, gps: GpsMemory, aid: AidMemory, m: FlowMemory, *, t_s: float) -> Held:
+    """A flow that is wrong again and again is tested and not fused while GPS holds.
+
+    Nor is one that sees again after BLIND_S in which nothing aided the position, until AGREEING more readings have
+    agreed with the one before than have not: the velocity is so unsure by then that a single reading would set it, and
+    move the position with it.
+    """
+    blind = look.reason == FUSED and aid.flag > 0.0 and t_s - m.taken_s > BLIND_S
+    after = with_agreed(m, agreed=0.0 if blind else (AGREEING if aid.flag == 0.0 else m.agreed))
+    wrong = holds(gps, t_s) and np.isfinite(m.wrong_s)
+    return Held(HeldBack(1.0 if wrong or after.agreed < AGREEING else 0.0), after)
+
+
+@equation
+def counted_agreement(change: float, variance: float, m: FlowMemory) -> float:
+    """Number of readings that agree less those that do not, after a component whose innovation changed by this much
+    since the reading before: it agrees within ALIKE_SIGMA of the noise of two. An error of the motion is in both.
+    """
+    agrees = change * change <= 2.0 * ALIKE_SIGMA * ALIKE_SIGMA * variance
+    counted = clamp(m.agreed + (0.5 if agrees else -0.5), 0.0, AGREEING)
+    return counted if m.agreed < AGREEING else m.agreed

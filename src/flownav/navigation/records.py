@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 from flownav.core.frames import GRAVITY_M_S2
 
+AGREEING = 5.0  # readings of a flow that was blind for long: chosen, a fifth of a second at 25 Hz
+
 
 class Reading(NamedTuple):
     """One reading of one sensor, its values as `measurement.COLUMNS` has them and the variances that it states.
@@ -124,7 +126,8 @@ class FlowMemory(NamedTuple):
     """taken_s: of the last tested flow; excess: how many times noisier than its model; bias of the sensor's own gyro
     [rad/s] and from how many readings; ratio: mean of nu^2 over its variance; doubted: 1 while that is too
     large; likeness: mean of `flow_noise.alike`; wrong_s: when that was too large last; -infinity where it is not;
-    usual: the quality that it usually has.
+    usual: the quality that it usually has; agreed: number of readings that agreed with the one before since it
+    was blind for long, less those that did not; AGREEING end the wait.
     """
 
     taken_s: float = -inf
@@ -137,6 +140,7 @@ class FlowMemory(NamedTuple):
     likeness: float = 0.0
     wrong_s: float = -inf
     usual: float = 0.0
+    agreed: float = AGREEING
 
 
 class FlowSum(NamedTuple):

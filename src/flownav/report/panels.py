@@ -1,6 +1,5 @@
 """Panels and tiles of a page, and numbers as pages write them."""
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,6 +10,7 @@ from flownav.report.chart import Chart
 from flownav.report.style import Drawing, figure
 
 NONE, MINUS = "\N{EN DASH}", "\N{MINUS SIGN}"
+MOST = 1e300  # of a number that is written; a larger integer may be none that a float holds
 
 
 def plotly() -> Any:
@@ -44,7 +44,7 @@ class Tile:
 
 def number(value: Any, digits: int = 4) -> str:
     """A number with a true minus sign and fixed decimals; a dash where there is none."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < MOST:
         return NONE
     return f"{value:z.{digits}f}".replace("-", MINUS)
 

@@ -12,7 +12,7 @@ from flownav.core.measurement import Array
 from flownav.core.record import Record, mapping
 from flownav.report import series
 from flownav.report.figures_innovation import SENSOR_TITLES
-from flownav.report.panels import NONE, number
+from flownav.report.panels import MOST, NONE, number
 from flownav.scoring.phases import Phase, phase_at
 from flownav.scoring.recorded import rejected_mostly_in, scores_by_phase
 from flownav.scoring.sensor_verdict import verdict
@@ -190,14 +190,23 @@ def rejected_rows(record: Record, phases: Sequence[Phase] = ()) -> list[tuple[st
         counted = mapping(readings_of.get(sensor))
         whole, read = mapping(counted.get("rejected")), counted.get("read")
         of = f" of {read:,}" if isinstance(read, int) else ""
-        rows += [(sensor, reason, whole.get(reason), count, of) for reason, count in mapping(reasons).items()]
-    rows.sort(key=lambda row: -float(row[3]))
+        rows += [
+            (sensor, reason, n if isinstance(n := whole.get(reason), int) else None, count, of)
+            for reason, count in mapping(reasons).items()
+            if isinstance(count, int)
+        ]
+    rows.sort(key=lambda row: -row[3])
     mostly = rejected_mostly_in(record, phases)
     return [
         (SENSOR_TITLES.get(s, s.replace("_", " ")), r.replace("_", " "), NONE if n is None else f"{n:,}{of}", f"{c:,}",
          mostly.get((s, r), NONE))
         for s, r, n, c, of in rows
     ]  # fmt: skip
+
+
+def _known(value: Any) -> float:
+    """A score of a manifest; 0 where it is none."""
+    return float(value) if isinstance(value, (int, float)) and abs(value) < MOST else 0.0
 
 
 def sensor_rows(record: Record) -> list[tuple[str, ...]]:
@@ -212,12 +221,9 @@ def sensor_rows(record: Record) -> list[tuple[str, ...]]:
         span_s = f"{number(span.get('t0'), 1)} to {number(span.get('t1'), 1)}" if span else NONE
         mean, tested, lost, verdict_words = NONE, NONE, NONE, ""
         if found:
-            mean, tested = number(found.get("nis_per_dof"), 2), f"{found.get('samples') or 0:,}"
-            refused = float(found.get("refused") or 0.0)
-            lost = number(100.0 * refused, 1)
-            verdict_words = verdict(
-                float(found.get("nis_per_dof") or 0.0), white=bool(found.get("white")), refused=refused
-            )
+            square, samples, refused = (_known(found.get(key)) for key in ("nis_per_dof", "samples", "refused"))
+            mean, tested, lost = number(found.get("nis_per_dof"), 2), f"{samples:,.0f}", number(100.0 * refused, 1)
+            verdict_words = verdict(square, white=bool(found.get("white")), refused=refused)
         title = SENSOR_TITLES.get(name, name.replace("_", " "))
         rows.append((title, span_s, *_pace(record, name), tested, mean, lost, verdict_words))
     return rows

@@ -15,6 +15,7 @@ from flownav.core.guard import an_input, written_whole
 PICTURES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm"}
 VIDEOS = {".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v"}
 LARGEST_FRAMES_BYTES = 4_000_000_000
+MOST_PIXELS = 32_000_000  # of a picture; a file of some kilobytes can state any number
 
 
 def read_frames(paths: Sequence[Path]) -> NDArray[np.uint8]:
@@ -37,10 +38,17 @@ def read_grey(path: Path) -> NDArray[np.uint8]:
     image_of, path = pillow(), an_input(path)
     try:
         with image_of.open(path) as picture:
+            width, height = picture.size
+            if width * height > MOST_PIXELS:
+                raise InputError(
+                    f"{path}: {width}x{height} pixels; at most {MOST_PIXELS:,} are read, so make it smaller"
+                )
             mode = "I" if picture.mode.startswith("I") else "L"
             grey = np.asarray(picture.convert(mode))
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
+    except InputError:
+        raise
     except Exception as error:  # pillow raises many kinds on a broken file
         raise InputError(f"{path}: not a picture that can be read ({type(error).__name__}: {error})") from None
     return (grey >> 8).astype(np.uint8) if mode == "I" and grey.size and grey.max() > 255 else grey.astype(np.uint8)
@@ -79,7 +87,11 @@ def _video(path: Path) -> NDArray[np.uint8]:
         ) from None
     try:
         with av.open(str(an_input(path))) as container:
-            frames = [frame.to_ndarray(format="gray") for frame in container.decode(video=0)]
+            frames: list[NDArray[np.uint8]] = []
+            for frame in container.decode(video=0):
+                if frame.width * frame.height * (len(frames) + 1) > LARGEST_FRAMES_BYTES:
+                    raise InputError(f"{path}: its frames do not fit in memory; cut it into pieces, or make it smaller")
+                frames.append(frame.to_ndarray(format="gray"))
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
     except (OSError, ValueError, IndexError) as error:  # av's own errors derive from these

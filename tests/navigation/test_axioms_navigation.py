@@ -57,9 +57,9 @@ from flownav.navigation.records import (
     HeadingMemory,
     RangeMemory,
     Reading,
-    RejectionMemory,
     StartMemory,
     SuspicionMemory,
+    WitnessMemory,
 )
 from flownav.navigation.rings import Given, Rings, numbers_of
 from flownav.navigation.settings import NavigatorSettingsFile
@@ -265,8 +265,8 @@ def test_no_verdict_hangs_on_the_zero_of_time():
             if since_s > t_s:
                 continue
             shifted, T = since_s + LATER_S, t_s + LATER_S
-            one, m = judge_rejections(2.0, True, False, t_s, RejectionMemory(7.0, since_s), TOLD.gps)
-            other, after = judge_rejections(2.0, True, False, T, RejectionMemory(7.0, shifted), TOLD.gps)
+            one, m = judge_rejections(2.0, True, False, t_s, WitnessMemory(times=7.0, since_s=since_s), TOLD.gps)
+            other, after = judge_rejections(2.0, True, False, T, WitnessMemory(times=7.0, since_s=shifted), TOLD.gps)
             assert (one, m._replace(since_s=m.since_s + LATER_S)) == (other, after)
             suspected = [
                 judge_suspicion(SuspicionMemory(2.0, since, since, 3.0), 1.0, 4, False, 0.5, 0.9, now)

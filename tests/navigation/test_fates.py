@@ -13,7 +13,7 @@ from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GPS_FAST, GPS_SLOW, 
 from flownav.navigation import verdicts
 from flownav.navigation.compass import check_compass
 from flownav.navigation.course import FOUND_RAD, LEAST_TRAVEL_M, find_heading
-from flownav.navigation.gps import UNKNOWN_PAD_M, AlongAxis, judge_fate
+from flownav.navigation.gps import AlongAxis, judge_fate
 from flownav.navigation.kernel_settings import NO_HEADING, Equipment
 from flownav.navigation.motion_records import CourseMemory, ImuMemory, PushMemory
 from flownav.navigation.offers import compare_level, note_aid, note_aid_age, note_height
@@ -41,8 +41,8 @@ from flownav.navigation.records import (
     PadMemory,
     RangeMemory,
     Reading,
-    RejectionMemory,
     StartMemory,
+    WitnessMemory,
 )
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.start import start_lanes
@@ -55,7 +55,8 @@ from flownav.navigation.tape import (
     PAD_FOUND,
     POSITION_INVALID,
 )
-from flownav.navigation.verdicts import Fate, Offer
+from flownav.navigation.trust import OF_GPS
+from flownav.navigation.verdicts import UNKNOWN_M, Fate, Offer
 
 NAN = math.nan
 FITTED = Equipment(True, False, NO_HEADING, False, -math.inf)
@@ -77,14 +78,14 @@ def placed(resets) -> list[tuple[int, float]]:
 
 # -- GPS -----------------------------------------------------------------------------------------------------
 REFUSED = verdicts.Tested(INNOVATION_GATE, 1e3, 1.0, 0.25)
-OFTEN = RejectionMemory(30.0, 0.0)
+OFTEN = WitnessMemory(times=30.0, since_s=0.0)
 
 
 def fate(tested=REFUSED, axis=1, position=True, flow=None, ranged=None, pad=0.0, arrived=1.0, often=OFTEN):
     return judge_fate.law(
         tested, reading(10.0, 20.0, 30.0, arrived=arrived), AlongAxis(2.0, 3.0, 0.5, 0.04), flow or FlowMemory(),
         ranged or RangeMemory(), FixMemory(often, GpsMemory(moved_n_m=1.0, moved_e_m=2.0), PadMemory(pad)), t_s=99.0,
-        place=axis if position else 3 + axis, s=TOLD.gps,
+        place=OF_GPS + (axis if position else 3 + axis), s=TOLD.gps,
     )  # fmt: skip
 
 
@@ -95,7 +96,7 @@ def test_a_position_that_is_refused_for_long_goes_to_the_fix_and_its_lasting_err
     assert found.goes[2].variance == pytest.approx(lasting + 0.25)
     assert found.event == (GPS_RESET, 18.0)
     assert (found.memory.gps.moved_n_m, found.memory.gps.moved_e_m) == (1.0, 20.0)
-    assert found.memory.rejection.times == 0.0
+    assert found.memory.witness.times == 0.0
 
 
 def test_a_velocity_that_is_refused_for_long_goes_to_the_fix_and_moves_no_position():
@@ -109,7 +110,7 @@ def test_a_velocity_that_is_refused_for_long_goes_to_the_fix_and_moves_no_positi
 @pytest.mark.parametrize("position", [True, False])
 def test_what_leapt_along_down_is_not_followed_while_the_range_holds_the_height(position):
     """A range that is refused too holds nothing, and neither does flow; what crept, and is a velocity, is followed."""
-    leapt = RejectionMemory(30.0, 80.0, 79.0, 1.0)
+    leapt = WitnessMemory(times=30.0, since_s=80.0, fused_s=79.0, leapt=1.0)
     held, refused = RangeMemory(taken_s=98.9), RangeMemory(taken_s=98.9, refused_s=90.0)
     assert placed(fate(axis=2, position=position, ranged=held, often=leapt).goes) == []
     assert placed(fate(axis=2, position=position, ranged=refused, often=leapt).goes)
@@ -122,8 +123,8 @@ def test_what_leapt_along_down_is_not_followed_while_the_range_holds_the_height(
 def test_an_axis_that_is_refused_for_the_others_sake_alone_does_not_count():
     found = fate(verdicts.Tested(INNOVATION_GATE, 0.1, 1.0, 0.25))
     assert placed(found.goes) == []
-    assert found.memory.rejection.times == 0.0
-    assert fate(arrived=0.0).memory.rejection == OFTEN
+    assert found.memory.witness.times == 0.0
+    assert fate(arrived=0.0).memory.witness == OFTEN
 
 
 @pytest.mark.parametrize(("pad", "flow", "goes"), [
@@ -133,7 +134,7 @@ def test_an_axis_that_is_refused_for_the_others_sake_alone_does_not_count():
 def test_the_pad_goes_along_with_the_position_where_it_is_known_and_nobody_doubts_the_flow(pad, flow, goes):
     found = fate(pad=pad, flow=flow)
     assert found.pad_goes == goes
-    assert found.pad == ((PAD + 1, 20.5, UNKNOWN_PAD_M**2) if goes else (-1, 20.5, UNKNOWN_PAD_M**2))
+    assert found.pad == ((PAD + 1, 20.5, UNKNOWN_M**2) if goes else (-1, 20.5, UNKNOWN_M**2))
     assert found.tie == (Offer(0.5, 0.04, FUSED) if goes else Offer(0.0, 1.0, SILENT))
 
 

@@ -39,20 +39,21 @@ from flownav.navigation.reasons import (
     STUCK,
     TILTED,
     component_of,
+    judged,
+    objecting,
+    stated_or,
     usable,
     usable_in_flight,
 )
 from flownav.navigation.records import (
-    BaroMemory,
     FlowMemory,
     HeadingMemory,
     LevelMemory,
     Look,
-    NoiseMemory,
     RangeMemory,
     Reading,
-    RejectionMemory,
     StartMemory,
+    WitnessMemory,
 )
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tape import BARO_FOUND
@@ -95,6 +96,19 @@ def test_what_is_said_of_any_reading_stands_in_this_order():
     assert usable_in_flight(reading(1.0), 1.0, 1.0, 1.0) == FUSED
 
 
+def test_one_judge_gives_the_first_objection_in_its_order():
+    """Unusable before out of reach, that before a repetition, and that before what other evidence has against it."""
+    assert judged(NO_DATA, TILTED, True, INNOVATION_GATE) == NO_DATA
+    assert judged(SILENT, TILTED, True, INNOVATION_GATE) == SILENT
+    assert judged(FUSED, TILTED, True, INNOVATION_GATE) == TILTED
+    assert judged(FUSED, FUSED, True, INNOVATION_GATE) == STUCK
+    assert judged(FUSED, FUSED, False, INNOVATION_GATE) == INNOVATION_GATE
+    assert judged(FUSED, FUSED, False, FUSED) == FUSED
+    assert [objecting(before, True, TILTED) for before in (FUSED, STUCK)] == [TILTED, STUCK]
+    assert objecting(FUSED, False, TILTED) == FUSED
+    assert [stated_or(stated, 4.0) for stated in (0.25, NAN, math.inf)] == [0.25, 4.0, 4.0]
+
+
 # -- GPS -----------------------------------------------------------------------------------------------------
 PUSHED = SteadyForce(3.0, 0.0, -GRAVITY_M_S2 - 4.0)  # by 5 m/s2
 
@@ -124,7 +138,7 @@ def test_a_velocity_errs_by_what_a_receivers_lag_leaves_over_and_that_is_not_lea
 
     def followed(place: int) -> float:
         """The factor after 40 s in which a noise of 0.2 m/s has its stated size."""
-        m, rng = NoiseMemory(), np.random.default_rng(1)
+        m, rng = WitnessMemory(), np.random.default_rng(1)
         for i, nu in enumerate(0.2 * rng.standard_normal(200)):
             total = 0.04 * m.factor + (lagging if place > OF_GPS + 2 else 0.0)
             tested = Outcome(FUSED, nu, total + 0.01, total)
@@ -136,7 +150,7 @@ def test_a_velocity_errs_by_what_a_receivers_lag_leaves_over_and_that_is_not_lea
     )  # of a velocity as of a place, which does not lag
     assert followed(OF_GPS) == pytest.approx(1.0, abs=0.15)
     refused = Outcome(INNOVATION_GATE, 9.0, 0.05, 0.04)
-    m = NoiseMemory()
+    m = WitnessMemory()
     assert follow_fix_noise.law(refused, StartMemory(1.0), PUSHED, m, t_s=1.0, place=OF_GPS, s=s) == m
 
 
@@ -162,35 +176,35 @@ def test_a_fix_that_jumps_along_one_axis_is_refused_along_both_and_keeps_its_hei
 
 
 def test_gps_is_believed_once_it_was_refused_often_and_for_long():
-    m = RejectionMemory(0.0, 0.0)
+    m = WitnessMemory()
     for t_s in (10.0, 10.3, 10.6, 10.9):  # a second will do where flow is doubted, and five refusals
         reset, m = judge_rejections(2.0, True, True, t_s, m, TOLD.gps)
         assert not reset
     assert judge_rejections(2.0, True, True, 11.2, m, TOLD.gps)[0]
     assert not judge_rejections(2.0, True, False, 11.2, m, TOLD.gps)[0]
-    m, times = RejectionMemory(0.0, 0.0), []
+    m, times = WitnessMemory(), []
     for t_s in np.arange(10.0, 30.0, 0.5).tolist():
         reset, m = judge_rejections(2.0, True, False, t_s, m, TOLD.gps)
         times += [t_s] * reset
     assert times == [17.0, 24.5]  # 7 s each, and the count begins anew
-    m = RejectionMemory(0.0, 0.0)
+    m = WitnessMemory()
     for t_s in (10.0, 14.0, 17.5, 20.0):  # long, and not often
         reset, m = judge_rejections(2.0, True, False, t_s, m, TOLD.gps)
         assert not reset
     assert judge_rejections(2.0, True, False, 21.0, m, TOLD.gps)[0]
-    assert judge_rejections(0.0, True, False, 21.0, m, TOLD.gps) == (False, RejectionMemory(0.0, 10.0))
+    assert judge_rejections(0.0, True, False, 21.0, m, TOLD.gps) == (False, WitnessMemory(since_s=10.0))
 
 
 def test_a_velocity_that_leapt_out_of_its_gate_is_not_followed_while_flow_holds():
     """One that jumps is the receiver's; one that creeps out may be led away by a flow of the wrong sign."""
     for first, followed in ((1.5, True), (2.0 * LEAPT_RATIO, False)):
-        m, resets = RejectionMemory(0.0, 0.0, 9.8), []
+        m, resets = WitnessMemory(fused_s=9.8), []
         for t_s in np.arange(10.0, 13.0, 0.2).tolist():
             ratio = first if t_s == 10.0 else 50.0
             reset, m = judge_rejections(ratio, False, False, t_s, m, TOLD.gps, seen=True)
             resets.append(reset)
         assert any(resets) == followed
-    m = RejectionMemory(0.0, 0.0, 5.0)  # a receiver that was silent before tells news
+    m = WitnessMemory(fused_s=5.0)  # a receiver that was silent before tells news
     resets = []
     for t_s in np.arange(10.0, 11.5, 0.2).tolist():
         reset, m = judge_rejections(50.0, False, False, t_s, m, TOLD.gps, seen=True)
@@ -391,16 +405,20 @@ def test_pressure_height():
     def judged(given: Reading, known: float = 1.0, started: float = 1.0, factor: float = 1.0):
         start = StartMemory(*[started, *StartMemory()[1:]])
         return judge_baro.law(
-            given, start, PositionNed(0.0, 0.0, -3.0), BaroMemory(known), NoiseMemory(factor), s=TOLD.height
+            given, start, PositionNed(0.0, 0.0, -3.0), WitnessMemory(factor, known=known), s=TOLD.height
         )
 
-    assert judged(reading(100.0)) == (BaroMemory(1.0), (-1, 97.0, 1e4), (-1, 97.0), Offer(100.0, 1.0, FUSED))
+    assert judged(reading(100.0)) == (WitnessMemory(known=1.0), (-1, 97.0, 1e4), (-1, 97.0), Offer(100.0, 1.0, FUSED))
     assert judged(reading(100.0, variance=(0.04,))).offer == Offer(100.0, 0.04, FUSED)
     assert judged(reading(100.0), factor=9.0).offer == Offer(100.0, 9.0, FUSED)
     assert judged(reading(100.0), started=0.0).offer.reason == SILENT
     first = judged(reading(100.0), known=0.0)
-    assert (first.baro, first.reset, first.found) == (BaroMemory(1.0), Reset(BARO, 97.0, 1e4), Event(BARO_FOUND, 97.0))
-    assert judged(reading(NAN), known=0.0).baro == BaroMemory(0.0)
+    assert (first.baro, first.reset, first.found) == (
+        WitnessMemory(known=1.0),
+        Reset(BARO, 97.0, 1e4),
+        Event(BARO_FOUND, 97.0),
+    )
+    assert judged(reading(NAN), known=0.0).baro == WitnessMemory(known=0.0)
 
 
 # -- attitude and heading --------------------------------------------------------------------------------------

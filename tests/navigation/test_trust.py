@@ -13,7 +13,7 @@ from flownav.navigation.flow_noise import LARGEST_CHANGE, LARGEST_EXCESS, MEAN_C
 from flownav.navigation.kernel_settings import NO_HEADING, Equipment
 from flownav.navigation.memory import MEMORY, REASON, load_whiteness, new_work
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE, OUT_OF_RANGE, SILENT
-from flownav.navigation.records import EchoMemory, FlowMemory, NoiseMemory, WhitenessMemory
+from flownav.navigation.records import EchoMemory, FlowMemory, WhitenessMemory, WitnessMemory
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.trust import (
     FACTOR_PACE,
@@ -38,7 +38,7 @@ from flownav.navigation.trust import (
 
 _, store_echo = MEMORY.access(EchoMemory)
 _, store_whiteness = MEMORY.access(WhitenessMemory)
-load_noise, store_noise = MEMORY.access(NoiseMemory)
+load_noise, store_noise = MEMORY.access(WitnessMemory)
 
 TOLD = NavigatorSettingsFile().settings(Equipment(True, False, NO_HEADING, False, -math.inf))
 KNOWN = 1e6  # readings, after which one counts by time alone
@@ -150,7 +150,7 @@ def test_level_it_is_as_noisy_as_along_the_worse_axis_and_down_by_itself():
 # -- a sensor's own noise ------------------------------------------------------------------------------------
 def follow(innovations, noise: float, smallest: float = SMALLEST_NOISE, hz: float = 10.0) -> float:
     """The mean factor of a component of stated noise, after 100 s."""
-    m, seen = NoiseMemory(1.0, 0.0, -math.inf), []
+    m, seen = WitnessMemory(1.0, 0.0, -math.inf), []
     for k, innovation in enumerate(innovations):
         m = followed_noise(innovation, 2.0 * noise * m.factor, noise * m.factor, smallest, 5.0, k / hz, m)
         seen.append(m.factor)
@@ -166,20 +166,24 @@ def test_a_noise_goes_to_the_variance_of_what_changes_from_reading_to_reading(ti
 
 
 def test_the_first_readings_teach_a_noise_sooner():
-    sooner, later = (followed_noise(0.9, 9.0, 0.5, 0.02, 5.0, 5.2, NoiseMemory(2.0, 0.3, 5.0, n)) for n in (0.0, KNOWN))
+    sooner, later = (
+        followed_noise(0.9, 9.0, 0.5, 0.02, 5.0, 5.2, WitnessMemory(2.0, 0.3, 5.0, n)) for n in (0.0, KNOWN)
+    )
     assert (sooner.factor - 2.0) / (later.factor - 2.0) == pytest.approx(NOISE_TIME_S / 0.2 / FIRST_READINGS)
 
 
 def test_one_reading_moves_a_noise_by_its_share_of_twenty_seconds():
-    m = NoiseMemory(2.0, 0.3, 5.0, KNOWN)
+    m = WitnessMemory(2.0, 0.3, 5.0, KNOWN)
     after = followed_noise(0.9, 9.0, 0.5, 0.02, 5.0, 5.2, m)
-    assert after == NoiseMemory(pytest.approx(2.0 + 0.01 * (0.5 * 0.36 / 0.5 - 1.0) * 2.0), 0.9, 5.2, KNOWN + 1.0)
+    assert after == WitnessMemory(pytest.approx(2.0 + 0.01 * (0.5 * 0.36 / 0.5 - 1.0) * 2.0), 0.9, 5.2, KNOWN + 1.0)
     assert followed_noise(1e3, 0.5, 0.5, 0.02, 5.0, 5.2, m).factor == pytest.approx(2.0 + 0.01 * (25.0 - 1.0) * 2.0)
 
 
 def test_readings_more_than_a_second_apart_say_nothing_of_the_noise():
-    assert followed_noise(9.0, 1.0, 0.5, 0.02, 5.0, 6.1, NoiseMemory(2.0, 0.0, 5.0)) == NoiseMemory(2.0, 9.0, 6.1, 1.0)
-    assert followed_noise(9.0, 1.0, 0.5, 0.02, 5.0, 6.1, NoiseMemory(1.0, 0.0, -math.inf)).factor == 1.0
+    assert followed_noise(9.0, 1.0, 0.5, 0.02, 5.0, 6.1, WitnessMemory(2.0, 0.0, 5.0)) == WitnessMemory(
+        2.0, 9.0, 6.1, 1.0
+    )
+    assert followed_noise(9.0, 1.0, 0.5, 0.02, 5.0, 6.1, WitnessMemory(1.0, 0.0, -math.inf)).factor == 1.0
 
 
 def test_a_noise_stays_between_a_fiftieth_and_twenty_five_times_what_is_said():
@@ -188,10 +192,10 @@ def test_a_noise_stays_between_a_fiftieth_and_twenty_five_times_what_is_said():
     assert follow(np.tile([-9.0, 9.0], 4000), 0.04) <= LARGEST_NOISE
 
 
-def heard(place: int, reason: int = FUSED, stray: float = 0.0, change: float = 0.0) -> NoiseMemory:
+def heard(place: int, reason: int = FUSED, stray: float = 0.0, change: float = 0.0) -> WitnessMemory:
     """The noise of a component after one reading, half a second after the one before."""
     work = new_work(ONE_LANE)
-    store_noise(work, ONE_LANE, place, 0, NoiseMemory(0.1, 0.0, 0.5, KNOWN))
+    store_noise(work, ONE_LANE, place, 0, WitnessMemory(0.1, 0.0, 0.5, KNOWN))
     store_echo(work, ONE_LANE, 0, EchoMemory(2.0, 0.0, 2.0, 0.0, stray))
     work[[REASON, INNOVATION, INNOVATION_VARIANCE, NOISE]] = reason, change, 2.0, 1.0
     scale_noise(work, ONE_LANE, place)
@@ -202,12 +206,12 @@ def heard(place: int, reason: int = FUSED, stray: float = 0.0, change: float = 0
 
 def test_what_is_fused_teaches_its_noise_and_a_stray_or_what_is_refused_does_not():
     taught = heard(OF_RANGE)
-    assert taught == NoiseMemory(pytest.approx(0.1 - 0.025 * 0.1), 0.0, 1.0, KNOWN + 1.0)
-    untaught = NoiseMemory(0.1, 0.0, 0.5, KNOWN)
+    assert taught == WitnessMemory(pytest.approx(0.1 - 0.025 * 0.1), 0.0, 1.0, KNOWN + 1.0)
+    untaught = WitnessMemory(0.1, 0.0, 0.5, KNOWN)
     assert heard(OF_RANGE, INNOVATION_GATE) == untaught
     assert heard(OF_RANGE, stray=0.03) == untaught
     assert heard(OF_RANGE, stray=0.01) == taught
-    assert heard(OF_BARO) == NoiseMemory(SMALLEST_OF_BARO, 0.0, 1.0, KNOWN + 1.0)  # wash and gusts last
+    assert heard(OF_BARO) == WitnessMemory(SMALLEST_OF_BARO, 0.0, 1.0, KNOWN + 1.0)  # wash and gusts last
     assert heard(OF_BARO, stray=0.03, change=1.0).factor > 0.1  # strays are the range's
 
 

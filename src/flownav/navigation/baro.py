@@ -2,9 +2,7 @@
 
 from typing import NamedTuple
 
-import numpy as np
-
-from flownav.core.compile import Lanes, Work, equation, procedure
+from flownav.core.compile import Lanes, Work, equation, procedure, replacing
 from flownav.estimation.covariance import consider, consider_none
 from flownav.estimation.laws.height import baro_altitude
 from flownav.estimation.named import PositionNed
@@ -14,17 +12,19 @@ from flownav.navigation.kernel_settings import HeightSettings
 from flownav.navigation.memory import GROUNDED
 from flownav.navigation.offers import conclude, note_height
 from flownav.navigation.packed import load_height_settings
-from flownav.navigation.reasons import FUSED, usable_in_flight
-from flownav.navigation.records import BaroMemory, NoiseMemory, Reading, StartMemory
+from flownav.navigation.reasons import FUSED, judged, stated_or, usable_in_flight
+from flownav.navigation.records import Reading, StartMemory, WitnessMemory
 from flownav.navigation.tape import BARO_FOUND, Output
 from flownav.navigation.trust import OF_BARO, follow_noise
 from flownav.navigation.verdicts import UNKNOWN_M, Event, Offer, Reset, on_lanes
+
+with_datum = replacing(WitnessMemory, "known")
 
 
 class BaroVerdict(NamedTuple):
     """Verdict on a pressure height: memory, reset of the datum, event, and offer to the filter."""
 
-    baro: BaroMemory
+    baro: WitnessMemory
     reset: Reset
     found: Event
     offer: Offer
@@ -32,19 +32,18 @@ class BaroVerdict(NamedTuple):
 
 @on_lanes(calls.judge_baro)
 def judge_baro(
-    reading: Reading, start: StartMemory, position: PositionNed, m: BaroMemory, noise: NoiseMemory, *, s: HeightSettings
+    reading: Reading, start: StartMemory, position: PositionNed, m: WitnessMemory, *, s: HeightSettings
 ) -> BaroVerdict:
     """Height from pressure [m]; the first reading finds the offset."""
-    stated = reading.variance_0
-    variance = stated if np.isfinite(stated) else s.baro_sigma_m * s.baro_sigma_m
-    reason = usable_in_flight(reading, reading.value_0, variance, start.started)
+    variance = stated_or(reading.variance_0, s.baro_sigma_m * s.baro_sigma_m)
+    reason = judged(usable_in_flight(reading, reading.value_0, variance, start.started), FUSED, False, FUSED)
     first = reason == FUSED and m.known == 0.0
     offset_m = reading.value_0 + position.pos_d
     return BaroVerdict(
-        BaroMemory(1.0 if first else m.known),
+        with_datum(m, known=1.0 if first else m.known),
         Reset(BARO if first else -1, offset_m, UNKNOWN_M * UNKNOWN_M),
         Event(BARO_FOUND if first else -1, offset_m),
-        Offer(reading.value_0, variance * noise.factor, reason),
+        Offer(reading.value_0, variance * m.factor, reason),
     )
 
 

@@ -20,6 +20,8 @@ from flownav.navigation.reasons import (
     SILENT,
     TILTED,
     is_received,
+    judged,
+    objecting,
     usable_in_flight,
 )
 from flownav.navigation.records import (
@@ -167,14 +169,13 @@ def judge_look(
 ) -> Look:
     """The verdict on the whole reading; flow turns with the heading, and waits until that is found."""
     turning = look.turning_x + look.turning_y if angular else 0.0
-    reason = usable_in_flight(reading, reading.value_0 + reading.value_1 + turning, 0.0, start.started)
-    reason = NO_HEIGHT if reason == FUSED and angular and look.known == 0.0 else reason
+    sound = usable_in_flight(reading, reading.value_0 + reading.value_1 + turning, 0.0, start.started)
+    unknown = angular and look.known == 0.0
     fast = angular and larger(abs(reading.value_0), abs(reading.value_1)) >= NEAR_LIMIT * s.flow_limit_rad_s
-    reason = OUT_OF_RANGE if reason == FUSED and fast else reason
-    reason = TILTED if reason == FUSED and look.upright < cos(s.tilt_limit_rad) else reason
     near = look.known > 0.0 and look.range_m * look.upright <= s.flow_min_height_m  # `lens_range` is at least 0.05
-    reason = NEAR_GROUND if reason == FUSED and near else reason
-    return with_reason(look, reason=NO_HEADING if reason == FUSED and heading.sought > 0.0 else reason)
+    seen = objecting(NO_HEIGHT if unknown else FUSED, fast, OUT_OF_RANGE)
+    reach = objecting(objecting(seen, look.upright < cos(s.tilt_limit_rad), TILTED), near, NEAR_GROUND)
+    return with_reason(look, reason=judged(sound, reach, False, NO_HEADING if heading.sought > 0.0 else FUSED))
 
 
 @on_lanes(calls.judge_scale)

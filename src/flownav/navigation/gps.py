@@ -21,26 +21,25 @@ from flownav.navigation.offers import (
     conclude,
     fuse_offered,
     gate_ratio,
-    judged_whole,
     note_aid,
     note_height,
+    spoilt_whole,
 )
 from flownav.navigation.packed import load_gps_settings
-from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT, component_of, usable
+from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT, component_of, judged, usable
 from flownav.navigation.records import (
     FixMemory,
     FlowMemory,
     GpsMemory,
     LevelMemory,
-    NoiseMemory,
     RangeMemory,
     Reading,
-    RejectionMemory,
     StartMemory,
+    WitnessMemory,
 )
 from flownav.navigation.tape import GPS_RESET, Output
 from flownav.navigation.trust import OF_GPS, SMALLEST_NOISE, followed_noise, scale_noise
-from flownav.navigation.verdicts import Event, Force, Noise, Offer, Reset, Tested, on_lanes
+from flownav.navigation.verdicts import UNKNOWN_M, Event, Force, Noise, Offer, Reset, Tested, on_lanes
 
 LAG_LEFT = 0.3  # chosen: half of it is as good, with none v is too sure in a tail wind (test_wind_from_all_sides)
 LEAST_REJECTIONS = 5  # chosen: a second of a 5 Hz receiver; one refusal alone is none (test_judges)
@@ -49,10 +48,10 @@ SOON_S = 1.0  # with 7 s a flow of the wrong sign carried the vehicle 84 m off, 
 JUMPED_S = 60.0
 LEAPT_RATIO = 4.0  # twice the gate: chosen; what a flow of the wrong sign leads away creeps out of it
 MOMENT_S = 1.5  # chosen: seven fixes of 5 Hz, in which flow and accelerometer cannot lose the way
-UNKNOWN_PAD_M = 100.0  # as good as unknown: the tie to the vehicle that follows determines it
 LEAST_PAD_VARIANCE_M2 = 1e-6  # chosen: 1 mm, so that a tie is never exact
 
-with_fused = replacing(RejectionMemory, "fused_s")
+with_fused = replacing(WitnessMemory, "fused_s")
+with_refusal = replacing(WitnessMemory, "times", "since_s", "leapt")
 with_reset = replacing(GpsMemory, "last_fix_s", "moved_n_m", "moved_e_m")
 
 
@@ -100,8 +99,8 @@ def judge_fix(
     white = white_position if position else white_velocity
     share = s.gps_white_share * s.gps_white_share * (stated if np.isfinite(stated) else 0.0)
     variance = white * white + share
-    reason = usable(reading, value, variance, start.started)
-    return Offer(value, variance, reason if alone else judged_whole(reason, axis, m))
+    sound = usable(reading, value, variance, start.started)
+    return Offer(value, variance, judged(sound, FUSED, False, spoilt_whole(alone, axis, m)))
 
 
 @equation
@@ -121,9 +120,9 @@ def add_lag(noise: Noise, start: StartMemory, steady: SteadyForce, *, s: GpsSett
 
 @on_lanes(calls.follow_fix_noise)
 def follow_fix_noise(
-    tested: Tested, start: StartMemory, steady: SteadyForce, m: NoiseMemory,
+    tested: Tested, start: StartMemory, steady: SteadyForce, m: WitnessMemory,
     *, t_s: float, place: int, s: GpsSettings,
-) -> NoiseMemory:  # fmt: skip
+) -> WitnessMemory:  # fmt: skip
     """After the test: an axis that was fused teaches its white noise; the rest of a lag lasts, and is no white
     noise.
     """
@@ -149,8 +148,8 @@ def smooth_force(steady: SteadyForce) -> Force:
 # -- a fix that is refused ------------------------------------------------------------------------------------
 @equation
 def judge_rejections(
-    ratio: float, position: bool, doubted: bool, t_s: float, m: RejectionMemory, s: GpsSettings, seen: bool = False
-) -> tuple[bool, RejectionMemory]:
+    ratio: float, position: bool, doubted: bool, t_s: float, m: WitnessMemory, s: GpsSettings, seen: bool = False
+) -> tuple[bool, WitnessMemory]:
     """Whether GPS has been refused for a state so often and so long that the filter is wrong, and the count.
 
     ratio: its test ratio where it is refused, else 0. position: or else it is a velocity, for which SOON_S is long
@@ -167,7 +166,7 @@ def judge_rejections(
     jumped = seen and since_s - m.fused_s <= MOMENT_S and (position or leapt > 0.0)
     patience_s = JUMPED_S if jumped else (s.gps_reset_s if position and not doubted else smaller(s.gps_reset_s, SOON_S))
     reset = refused and count >= LEAST_REJECTIONS and t_s - since_s >= patience_s
-    return reset, RejectionMemory(count if refused and not reset else 0.0, since_s, m.fused_s, leapt)
+    return reset, with_refusal(m, times=count if refused and not reset else 0.0, since_s=since_s, leapt=leapt)
 
 
 @equation
@@ -209,7 +208,8 @@ def judge_fate(
     flow, which is not doubted, measures how far it is from there.
     """
     m, gps, pad = memory
-    position, axis = place < 3, place if place < 3 else place - 3
+    position = place < OF_GPS + 3
+    axis = place - OF_GPS if position else place - OF_GPS - 3
     value, _ = component_of(reading, axis)
     here = reading.arrived > 0.0
     doubted = flow.doubted > 0.0 or bool(np.isfinite(flow.wrong_s))
@@ -236,7 +236,7 @@ def judge_fate(
         ),
         gone_to_gps(value, tested.variance, axis, position, goes, s),
         Event(GPS_RESET if goes else -1, by),
-        Reset(PAD + axis if pad_goes else -1, value + along.pad_off_m, UNKNOWN_PAD_M * UNKNOWN_PAD_M),
+        Reset(PAD + axis if pad_goes else -1, value + along.pad_off_m, UNKNOWN_M * UNKNOWN_M),
         Offer(
             along.pad_off_m if pad_goes else 0.0,
             along.pad_variance if pad_goes else 1.0,
@@ -274,7 +274,7 @@ def take_gps(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Outp
             note_aid(work, lanes, t_s, o)
         elif position:
             note_height(work, lanes, t_s)
-        if judge_fate(work, lanes, t_s, state, s, axis=axis, o=o):
+        if judge_fate(work, lanes, t_s, OF_GPS + state, s, axis=axis, o=o):
             pad_below(work, lanes, axis)
             fuse_offered(work, lanes, s.gate_sigma, o)
 

@@ -17,7 +17,7 @@ from flownav.navigation.kernel_settings import FROM_YAW, AttitudeSettings, Equip
 from flownav.navigation.memory import holds
 from flownav.navigation.offers import conclude, offer_what_is_sound
 from flownav.navigation.packed import load_attitude_settings
-from flownav.navigation.reasons import FUSED, INNOVATION_GATE, NO_HEADING, SILENT, is_received, usable_in_flight
+from flownav.navigation.reasons import FUSED, INNOVATION_GATE, NO_HEADING, SILENT, is_received, judged, usable_in_flight
 from flownav.navigation.records import GpsMemory, HeadingMemory, Reading, StartMemory
 from flownav.navigation.tape import Output
 from flownav.navigation.verdicts import Doubt, Fate, Noise, Offer, Tested, on_lanes
@@ -53,8 +53,7 @@ def offered_heading(
 ) -> HeadingVerdict:
     """A heading with the variance that is stated, or that of one alone; `weigh_heading` knows how often it is read."""
     modelled = not np.isfinite(stated)
-    refuted = reason == FUSED and m.refuted > 0.0
-    verdict = NO_HEADING if refuted else reason
+    verdict = judged(reason, FUSED, False, NO_HEADING if m.refuted > 0.0 else FUSED)
     after = with_time(
         m,
         read_s=t_s if modelled and verdict != SILENT else m.read_s,

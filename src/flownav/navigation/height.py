@@ -11,7 +11,7 @@ from flownav.estimation.states import GROUND, POSITION
 from flownav.navigation import calls
 from flownav.navigation.kernel_settings import HeightSettings
 from flownav.navigation.motion_records import ImuMemory
-from flownav.navigation.offers import conclude, fuse_offered, weigh_strays
+from flownav.navigation.offers import FEW_STRAYS, conclude, fuse_offered, weigh_strays
 from flownav.navigation.packed import load_height_settings
 from flownav.navigation.place import ON_GROUND
 from flownav.navigation.reasons import (
@@ -22,20 +22,23 @@ from flownav.navigation.reasons import (
     SILENT,
     STUCK,
     TILTED,
+    judged,
+    objecting,
+    stated_or,
     usable_in_flight,
 )
 from flownav.navigation.records import (
     AidMemory,
     EchoMemory,
     GroundMemory,
-    NoiseMemory,
     RangeMemory,
     RangingMemory,
     Reading,
     StartMemory,
+    WitnessMemory,
 )
 from flownav.navigation.tape import GROUND_FOUND, GROUND_RESET, RANGE_STUCK, Output
-from flownav.navigation.trust import OF_RANGE, STRAY_SHARE, creeps, follow_noise, watch_whiteness
+from flownav.navigation.trust import OF_RANGE, creeps, follow_noise, watch_whiteness
 from flownav.navigation.verdicts import (
     NO_EVENT,
     NO_RESET,
@@ -118,17 +121,15 @@ def range_verdict(
 ) -> tuple[int, float, RangeMemory]:
     """Verdict, variance and memory of one range [m] along the boresight."""
     range_m = reading.value_0
-    stated = reading.variance_0
-    variance = stated if np.isfinite(stated) else range_variance(range_m, s.range_sigma_m, s.range_relative_sigma)
-    reason = usable_in_flight(reading, range_m, variance, started)
+    once = stated_or(reading.variance_0, range_variance(range_m, s.range_sigma_m, s.range_relative_sigma))
     within = range_m >= s.range_min_m and range_m <= s.range_max_m
-    reason = OUT_OF_RANGE if reason == FUSED and not within else reason
-    reason = TILTED if reason == FUSED and height.upright < cos(s.tilt_limit_rad) else reason
+    reach = objecting(FUSED if within else OUT_OF_RANGE, height.upright < cos(s.tilt_limit_rad), TILTED)
     news = range_m != m.last_m
-    stuck = reason == FUSED and not news and repeats(t_s, m, height, alone, s)
-    variance = variance if news or alone else repeated_variance(variance, t_s - m.same_s)
+    stuck = not news and repeats(t_s, m, height, alone, s)
+    reason = judged(usable_in_flight(reading, range_m, once, started), reach, stuck, FUSED)
+    variance = once if news or alone else repeated_variance(once, t_s - m.same_s)
     after = with_value(m, last_m=range_m, same_s=t_s, down_m=height.pos_d_m) if reason == FUSED and news else m
-    return STUCK if stuck else reason, variance, after
+    return reason, variance, after
 
 
 @equation
@@ -204,7 +205,7 @@ class RangeVerdict(NamedTuple):
 
 @on_lanes(calls.judge_range)
 def judge_range(
-    reading: Reading, start: StartMemory, height: Height, aid: AidMemory, memory: RangingMemory, noise: NoiseMemory,
+    reading: Reading, start: StartMemory, height: Height, aid: AidMemory, memory: RangingMemory, noise: WitnessMemory,
     *, t_s: float, s: HeightSettings,
 ) -> RangeVerdict:  # fmt: skip
     """A range along the boresight: whether it may be fused, whether it is stuck, and the first ground that it finds."""
@@ -263,7 +264,7 @@ def judge_refusal(
     doubted_before = m.doubted if np.isfinite(m.refused_s) else 0.0
     lasting_s = t_s - since_s
     alone = t_s - aid.height_s > s.height_hold_s
-    second = refused and np.isfinite(m.refused_s) and doubted_before == 0.0 and echo.stray <= STRAY_SHARE
+    second = refused and np.isfinite(m.refused_s) and doubted_before == 0.0 and echo.stray <= FEW_STRAYS
     crept = second and creeps(tested, t_s, m, s.gate_sigma)
     long = alone and doubted_before == 0.0 and lasting_s >= DOUBTING_S
     doubts = refused and not strays and (long or crept)

@@ -10,6 +10,7 @@ from flownav.estimation.error_models import FilterSettings
 
 # headings: none, a magnetometer's, an external attitude's, an external heading
 NO_HEADING, FROM_MAG, FROM_ATTITUDE, FROM_YAW = 0.0, 1.0, 2.0, 3.0
+BIAS_LIMIT_SIGMAS = 3.0  # a limit leaves room for all but 3 in 1000 units; chosen
 
 
 class GpsSettings(NamedTuple):

@@ -39,7 +39,6 @@ from flownav.navigation.motion_records import (
 )
 from flownav.navigation.records import (
     AidMemory,
-    BaroMemory,
     EchoMemory,
     FlowInnovation,
     FlowMemory,
@@ -51,15 +50,14 @@ from flownav.navigation.records import (
     LevelMemory,
     Levels,
     Look,
-    NoiseMemory,
     PadMemory,
     RangeMemory,
     Reading,
-    RejectionMemory,
     ScaleDoubt,
     StartMemory,
     SuspicionMemory,
     WhitenessMemory,
+    WitnessMemory,
 )
 
 UNHELD_S = 1.0  # without a fix of GPS, nothing but flow measures the velocity: chosen as PX4's time to dead reckoning
@@ -78,16 +76,14 @@ GROUND_SEEN = MEMORY.keep(GroundMemory)
 FLOW = MEMORY.keep(FlowMemory)
 HEADING = MEMORY.keep(HeadingMemory)
 MEMORY.keep(BridgeMemory)
-MEMORY.keep(RejectionMemory, 6, "place")  # of position and velocity, north, east, down
 MEMORY.keep(SpikeMemory)
 MEMORY.keep(ImuWindow)
 MEMORY.keep(SeenWindow)
-MEMORY.keep(NoiseMemory, 8, "place")  # of range, barometer, GPS position and velocity by axis
+MEMORY.keep(WitnessMemory, 8, "place")  # of range, barometer, GPS position and velocity by axis
 MEMORY.keep(WhitenessMemory, 3, "axis")  # forward, right, down
 COURSE = MEMORY.keep(CourseMemory)
 MEMORY.keep(PushMemory)
 MEMORY.keep(StandMemory)
-MEMORY.keep(BaroMemory)
 MEMORY.keep(GpsMemory)
 MEMORY.keep(LevelMemory)
 MEMORY.keep(PadMemory)

@@ -24,9 +24,11 @@ from flownav.navigation.records import AidMemory, EchoMemory, LevelMemory, Readi
 from flownav.navigation.tape import AIDED_AGAIN, DEAD_RECKONING, POSITION_INVALID, Output, write_offer
 from flownav.navigation.verdicts import Accepted, Event, Fate, Noise, Observation, Offered, Tested, on_lanes
 
-CLOCK_SLACK_S = 1e-6  # the tick of logged times
+CLOCK_SLACK_S = 1e-6  # the tick of logged times, which are stated in microseconds
 LIKE_READINGS = 4.0  # number of successive readings that err alike: chosen; its effect stands in integrity.md
-FEW_STRAYS = 0.02  # sound ranges have 0.013 (mocap) and 0.02 (e-steps) at most, those that jump 0.11 and 0.78
+# Sound ranges have 0.013 (mocap) and 0.02 (e-steps) at most, those that jump 0.11 and 0.78; with more strays they are
+# weighed, and no evidence on the accelerometer (test_trust)
+FEW_STRAYS = 0.02
 STRAY_SHARE = 1.5  # some strays confirm each other: chosen; halved or doubled it fails test_strays
 STRAY_SPAN_M = 5.0  # chosen: sonars' neighbours are 3.2 and 3.7 m apart at most (outdoor-2 and -3)
 
@@ -128,9 +130,12 @@ def compare_level(tested: Tested, m: LevelMemory, *, axis: int, gate_sigma: floa
 
 
 @equation
-def judged_whole(reason: int, axis: int, m: LevelMemory) -> int:
-    """North and east come of one place, and a jump along one axis spoils both."""
-    return INNOVATION_GATE if reason == FUSED and axis < 2 and m.ratio > 1.0 else reason
+def spoilt_whole(alone: bool, axis: int, m: LevelMemory) -> int:
+    """North and east come of one place, and a jump along one axis spoils both: INNOVATION_GATE then, or FUSED.
+
+    alone: without regard to the other axis.
+    """
+    return INNOVATION_GATE if not alone and axis < 2 and m.ratio > 1.0 else FUSED
 
 
 # -- a reading among strays -------------------------------------------------------------------------------

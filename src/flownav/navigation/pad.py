@@ -14,9 +14,18 @@ from flownav.navigation import calls
 from flownav.navigation.kernel_settings import PlaceSettings
 from flownav.navigation.memory import MEMORY
 from flownav.navigation.motion_records import ImuMemory
-from flownav.navigation.offers import compare_level, conclude, judged_whole, note_aid, note_height
+from flownav.navigation.offers import compare_level, conclude, note_aid, note_height, spoilt_whole
 from flownav.navigation.packed import load_place_settings
-from flownav.navigation.reasons import DATUM, FUSED, INNOVATION_GATE, OUT_OF_RANGE, component_of, usable_in_flight
+from flownav.navigation.reasons import (
+    DATUM,
+    FUSED,
+    INNOVATION_GATE,
+    OUT_OF_RANGE,
+    component_of,
+    judged,
+    stated_or,
+    usable_in_flight,
+)
 from flownav.navigation.records import LevelMemory, PadMemory, Reading, StartMemory
 from flownav.navigation.tape import PAD_FOUND, Output
 from flownav.navigation.verdicts import UNKNOWN_M, Event, Fate, Offer, Reset, on_lanes
@@ -83,9 +92,9 @@ def judge_pad(reading: Reading, component: int, started: float, s: PlaceSettings
     reason = usable_in_flight(reading, reading.value_0 + reading.value_1 + distance, 0.0, started)
     near = distance < LEAST_PAD_DISTANCE_M
     lasts = (s.pad_scale_sigma if component == 2 else s.pad_boresight_sigma_rad) * distance
-    whole = variance_stated if np.isfinite(stated) else sigma * sigma
+    whole = stated_or(variance_stated, sigma * sigma)
     white = larger(whole - lasts * lasts, LEAST_WHITE_SHARE * whole)
-    return OUT_OF_RANGE if reason == FUSED and near else reason, white
+    return judged(reason, OUT_OF_RANGE if near else FUSED, False, FUSED), white
 
 
 @equation
@@ -160,11 +169,13 @@ def judge_sight(
     not found the pad yet notes a place and corrects nothing.
     """
     sound, fixed = judge_pad(reading, component, start.started, s)
-    reason = DATUM if sound == FUSED and pad.known < SEEN else sound
     variance = fixed + late_variance(velocity, m, reading.value_2, component, s)
     value, _ = component_of(reading, component)
-    judged = reason if alone else judged_whole(reason, 0, fix)
-    return PadOffer(Offer(value, variance, judged), Sight(reading.value_0, reading.value_1, reading.value_2))
+    outlier = DATUM if pad.known < SEEN else spoilt_whole(alone, 0, fix)
+    return PadOffer(
+        Offer(value, variance, judged(sound, FUSED, False, outlier)),
+        Sight(reading.value_0, reading.value_1, reading.value_2),
+    )
 
 
 @on_lanes(calls.count_refusals)

@@ -11,7 +11,7 @@ from flownav.estimation.named import PositionNed
 from flownav.navigation import calls
 from flownav.navigation.kernel_settings import PlaceSettings
 from flownav.navigation.motion_records import SeenWindow, StandMemory
-from flownav.navigation.offers import compare_level, conclude, fuse_offered, judged_whole, note_aid, note_height
+from flownav.navigation.offers import compare_level, conclude, fuse_offered, note_aid, note_height, spoilt_whole
 from flownav.navigation.packed import load_place_settings
 from flownav.navigation.pad import LEFT, NEVER_STOOD, STOOD_ON, Pad, pad_at
 from flownav.navigation.reasons import (
@@ -19,6 +19,8 @@ from flownav.navigation.reasons import (
     INNOVATION_GATE,
     SILENT,
     component_of,
+    judged,
+    stated_or,
     usable,
 )
 from flownav.navigation.records import AidMemory, LevelMemory, PadMemory, Reading, StartMemory
@@ -47,9 +49,9 @@ def judge_pose(
     judged together; alone: without regard to the other axis.
     """
     value, stated = component_of(reading, axis)
-    variance = stated if np.isfinite(stated) else s.pose_sigma_m * s.pose_sigma_m
-    reason = usable(reading, value, variance, start.started)
-    return Offer(value, variance, reason if alone else judged_whole(reason, axis, m))
+    variance = stated_or(stated, s.pose_sigma_m * s.pose_sigma_m)
+    sound = usable(reading, value, variance, start.started)
+    return Offer(value, variance, judged(sound, FUSED, False, spoilt_whole(alone, axis, m)))
 
 
 @procedure

@@ -1,5 +1,5 @@
 """The reasons for refusing a component, as kernels write them (`estimation.gating.Reason` in plain numbers), and the
-checks that all sensors have in common; what it means that a sensor speaks and does not serve.
+one judge whose way every sensor's reading goes; what it means that a sensor speaks and does not serve.
 """
 
 import numpy as np
@@ -42,6 +42,33 @@ def usable(reading: Reading, value: float, variance: float, started: float) -> i
 def usable_in_flight(reading: Reading, value: float, variance: float, started: float) -> int:
     """The reason by `usable`, or SILENT before the start, for a sensor that writes no row before the start."""
     return SILENT if started == 0.0 else usable(reading, value, variance, started)
+
+
+# -- the judge ------------------------------------------------------------------------------------------------
+# Usable, in reach, no mere repetition, no outlier: the first objection is the reading's reason. The gate
+# (`offers.fuse_offered`) and the memory of lasting refusals follow.
+@equation
+def stated_or(stated: float, own: float) -> float:
+    """The variance that a reading states, or where it states none the sensor's own."""
+    return stated if np.isfinite(stated) else own
+
+
+@equation
+def objecting(reason: int, holds: bool, objection: int) -> int:
+    """The reason that was found before; where that is FUSED and the objection holds, the objection."""
+    return objection if reason == FUSED and holds else reason
+
+
+@equation
+def judged(usable_so_far: int, reach: int, repeats: bool, outlier: int) -> int:
+    """The verdict on one component before its gate: the first objection, or FUSED where there is none.
+
+    usable_so_far: by `usable`. reach: why the sensor cannot see it from here, or FUSED. repeats: the same value for so
+    long that it is no news. outlier: why other evidence refuses it (a jump along another axis of one fix, a datum that
+    is not found yet, a refuted source), or FUSED.
+    """
+    reason = reach if usable_so_far == FUSED else usable_so_far
+    return objecting(objecting(reason, repeats, STUCK), True, outlier)
 
 
 HORIZONTAL = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.POSE)

@@ -102,12 +102,6 @@ class EchoMemory(NamedTuple):
     stray: float = 0.0
 
 
-class BaroMemory(NamedTuple):
-    """known: 1 once the pressure height of the local origin was found."""
-
-    known: float = 0.0
-
-
 class GroundMemory(NamedTuple):
     """known: 1 once ranges have found the ground. A ground that would be new: candidate_m, its down coordinate by the
     newest range; since_s and first_m, when and by which range it was seen first; agreeing, by how many in a row;
@@ -201,15 +195,23 @@ class HeadingMemory(NamedTuple):
     refused_s: float = nan
 
 
-class NoiseMemory(NamedTuple):
-    """factor: a component's noise over its stated noise [variance]; its innovation before, when that was [s], and the
-    number of innovations that it was estimated from.
+class WitnessMemory(NamedTuple):
+    """All that is remembered of one component of a range, a barometer or GPS.
+
+    factor: its noise over its stated noise [variance]; its innovation before, when that was [s], and the number of
+    innovations that the factor was estimated from. known: 1 once its datum was found. How often it was refused, one
+    after the other, and since when; when it was fused last; leapt: 1 where the first of them was far beyond the gate.
     """
 
     factor: float = 1.0
     before: float = 0.0
     received_s: float = -inf
     readings: float = 0.0
+    known: float = 0.0
+    times: float = 0.0
+    since_s: float = 0.0
+    fused_s: float = -inf
+    leapt: float = 0.0
 
 
 class WhitenessMemory(NamedTuple):
@@ -255,17 +257,6 @@ class PadMemory(NamedTuple):
     last_n_m: float = inf
     last_e_m: float = inf
     last_d_m: float = inf
-
-
-class RejectionMemory(NamedTuple):
-    """How often GPS was refused for one state, one after the other, and since when; when it was fused last; leapt: 1
-    where the first of them was far beyond the gate.
-    """
-
-    times: float = 0.0
-    since_s: float = 0.0
-    fused_s: float = -inf
-    leapt: float = 0.0
 
 
 class FlowSignMemory(NamedTuple):
@@ -316,6 +307,6 @@ class RangingMemory(NamedTuple):
 class FixMemory(NamedTuple):
     """All that is remembered of GPS, and of the pad that goes along with it."""
 
-    rejection: RejectionMemory
+    witness: WitnessMemory
     gps: GpsMemory
     pad: PadMemory

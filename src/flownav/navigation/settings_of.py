@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from flownav.core.frames import GRAVITY_M_S2
 from flownav.core.parameter_files import check
-from flownav.navigation.kernel_settings import NO_STATED_NOISE, FlowNoise
+from flownav.navigation.kernel_settings import BIAS_LIMIT_SIGMAS, NO_STATED_NOISE, FlowNoise
 from flownav.navigation.notch import LEAST_NOTCH_HZ, WIDTH, read_angle
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.sensors.barometer import BarometerSheet
@@ -24,7 +24,6 @@ from flownav.sensors.sheets import AccelerometerSheet, GpsReceiverSheet, GyroShe
 
 ABOVE_FLOOR_M = 0.01  # a step of the shipped lidar: a rangefinder that reads its floor shows only that there is no more
 LEAST_SHARE = 0.05  # of a stated accuracy, where the sheet states the change from fix to fix: chosen, not measured
-BIAS_LIMIT_SIGMAS = 3.0  # a limit leaves room for all but 3 in 1000 units; chosen
 VIBRATION_MARGIN = 2.0  # chosen, not measured: what is beyond twice the stated vibration, the sheet does not know
 # slower motion is held by what aids the IMU: level velocity errs by 1.17 of what is stated with 2, by 1.02 with 4
 AIDED_HZ = 3.0

@@ -19,7 +19,7 @@ from flownav.navigation import calls
 from flownav.navigation.kernel_settings import PlaceSettings
 from flownav.navigation.memory import HOLD_CLOCK, STILL_CLOCK, share, shared
 from flownav.navigation.motion_records import ImuMemory, ImuWindow, SeenWindow, StandMemory
-from flownav.navigation.offers import fuse_offered, note_aid
+from flownav.navigation.offers import CLOCK_SLACK_S, fuse_offered, note_aid
 from flownav.navigation.packed import load_place_settings
 from flownav.navigation.reasons import FUSED, SILENT
 from flownav.navigation.records import StartMemory
@@ -45,7 +45,6 @@ WINDOW_S = 0.5  # chosen: what stands for 2 s is known within 2 s (test_hard_fli
 # A stand is held to be one so often: an accelerometer that rotors make read 3 m/s2 too much as they spin up is 0.8 m/s
 # of velocity, and 0.2 m, in a window
 HOLD_S = 0.1
-SLACK_S = 1e-6  # of instants that are stated in microseconds
 # On the ground ranges read 0.02 (indoor-made), 0.05 (voxl) and 0.13 (outdoor); a hover at 0.3 m
 # must teach no gyro (test_hard_flights).
 NEAR_M = 0.15
@@ -218,7 +217,7 @@ ENDED, ENDED_STANDING = 1.0, 2.0  # a window has ended, and in it the vehicle st
 @equation
 def is_hold_due(work: Work, lanes: Lanes, t_s: float) -> bool:
     """Whether a stand is to be held to be one again."""
-    return t_s - shared(work, lanes, HOLD_CLOCK) >= HOLD_S - SLACK_S
+    return t_s - shared(work, lanes, HOLD_CLOCK) >= HOLD_S - CLOCK_SLACK_S
 
 
 @procedure
@@ -229,7 +228,7 @@ def hold_stand(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) -> floa
     if not is_hold_due(work, lanes, t_s):
         return 0.0
     share(work, lanes, HOLD_CLOCK, t_s)
-    ends = t_s - shared(work, lanes, STILL_CLOCK) >= WINDOW_S - SLACK_S
+    ends = t_s - shared(work, lanes, STILL_CLOCK) >= WINDOW_S - CLOCK_SLACK_S
     stands = judge_stand(work, lanes, t_s, o) if ends else stands_still(work, lanes)
     if stands:
         hold(work, lanes, t_s, load_place_settings(p), o)

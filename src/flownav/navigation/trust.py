@@ -13,8 +13,9 @@ import numpy as np
 from flownav.core.compile import Lanes, Work, clamp, equation, exp, larger, replacing
 from flownav.navigation import calls
 from flownav.navigation.memory import MEMORY, holds, load_whiteness
+from flownav.navigation.offers import FEW_STRAYS
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE
-from flownav.navigation.records import EchoMemory, GpsMemory, NoiseMemory, RangeMemory, WhitenessMemory
+from flownav.navigation.records import EchoMemory, GpsMemory, RangeMemory, WhitenessMemory, WitnessMemory
 from flownav.navigation.verdicts import Noise, Tested, on_lanes
 
 # Chosen together: an accelerometer that comes to read 3 m/s2 too much moves the position by 0.1 m (test_hard_flights),
@@ -34,7 +35,6 @@ SMALLEST_NOISE, LARGEST_NOISE = 0.02, 25.0  # of the stated variance: chosen; th
 SMALLEST_OF_BARO = 0.1  # wash and gusts last: chosen, not measured
 # places of components whose noise is followed; GPS position and velocity have three
 OF_RANGE, OF_BARO, OF_GPS = 0, 1, 2
-STRAY_SHARE = 0.02  # with more strays ranges are no evidence on the accelerometer: `offers.FEW_STRAYS` (test_trust)
 # Innovations lean to one side before a range creeps out of its gate: where they are white, their exponential mean has a
 # standard deviation of 0.58 and lies beyond CREPT_SIGMAS once in a hundred. The second refused is within JUMPED gates,
 # not the first: a sonar over grass (outdoor-3) leaves its gate for one reading.
@@ -45,6 +45,7 @@ CREEPING_M_S, NOISE_SIGMAS = 1.5, 3.0
 
 with_sum = replacing(WhitenessMemory, "since_s", "total", "readings")
 with_factor = replacing(WhitenessMemory, "factor")
+with_noise = replacing(WitnessMemory, "factor", "before", "received_s", "readings")
 
 
 @equation
@@ -78,7 +79,7 @@ def watch_whiteness(
     tested: Tested, echo: EchoMemory, gps: GpsMemory, m: WhitenessMemory, *, t_s: float, axis: int
 ) -> WhitenessMemory:
     """After the test of a component along body axis 0, 1 or 2: how alike its innovations are moves the factor."""
-    strays = axis == 2 and echo.stray > STRAY_SHARE
+    strays = axis == 2 and echo.stray > FEW_STRAYS
     unheld = not holds(gps, t_s)  # else a flow that is refused is what is wrong
     refused = tested.reason == INNOVATION_GATE and axis < 2 and unheld  # a refused echo is as alike as a wrong height
     counts = not strays and (tested.reason == FUSED or refused)
@@ -122,8 +123,8 @@ def creeps(tested: Tested, t_s: float, m: RangeMemory, gate_sigma: float) -> boo
 # -- a sensor's own noise -----------------------------------------------------------------------------------
 @equation
 def followed_noise(
-    innovation: float, total: float, noise: float, smallest: float, gate_sigma: float, t_s: float, m: NoiseMemory
-) -> NoiseMemory:
+    innovation: float, total: float, noise: float, smallest: float, gate_sigma: float, t_s: float, m: WitnessMemory
+) -> WitnessMemory:
     """A component's noise by what changes in its innovation from one reading to the next: half the mean square over R.
 
     What lasts there is of the motion, or an error that the filter carries as a state.
@@ -133,22 +134,28 @@ def followed_noise(
     change = clamp(innovation - m.before, -limit, limit)
     share = 0.0 if step_s > LONGEST_BLOCK_S else larger(step_s / NOISE_TIME_S, 1.0 / (FIRST_READINGS + m.readings))
     factor = m.factor + share * (0.5 * change * change / noise - 1.0) * m.factor
-    return NoiseMemory(clamp(factor, smallest, LARGEST_NOISE), innovation, t_s, m.readings + 1.0)
+    return with_noise(
+        m,
+        factor=clamp(factor, smallest, LARGEST_NOISE),
+        before=innovation,
+        received_s=t_s,
+        readings=m.readings + 1.0,
+    )
 
 
 @on_lanes(calls.scale_noise)
-def scale_noise(noise: Noise, m: NoiseMemory) -> Noise:
+def scale_noise(noise: Noise, m: WitnessMemory) -> Noise:
     """Before the test: the noise of the component of a place, as it was followed."""
     return Noise(noise.variance * m.factor)
 
 
 @on_lanes(calls.follow_noise)
 def follow_noise(
-    tested: Tested, echo: EchoMemory, m: NoiseMemory, *, t_s: float, place: int, gate_sigma: float
-) -> NoiseMemory:
+    tested: Tested, echo: EchoMemory, m: WitnessMemory, *, t_s: float, place: int, gate_sigma: float
+) -> WitnessMemory:
     """After the test: a component that was fused teaches its noise."""
     smallest = SMALLEST_OF_BARO if place == OF_BARO else SMALLEST_NOISE
-    strays = place == OF_RANGE and echo.stray > STRAY_SHARE
+    strays = place == OF_RANGE and echo.stray > FEW_STRAYS
     if tested.reason != FUSED or strays:
         return m
     return followed_noise(tested.innovation, tested.total, tested.variance, smallest, gate_sigma, t_s, m)

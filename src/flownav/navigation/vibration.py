@@ -12,7 +12,7 @@ import numpy as np
 from flownav.core.compile import clamp, equation, larger, replacing, smaller, squared
 from flownav.estimation.states import ACCEL_BIAS, GROUND, POSITION, VELOCITY
 from flownav.navigation import calls
-from flownav.navigation.kernel_settings import ImuSettings
+from flownav.navigation.kernel_settings import BIAS_LIMIT_SIGMAS, ImuSettings
 from flownav.navigation.motion_records import ForceBlocks, ImuMemory, MotionStep
 from flownav.navigation.records import Reading, StartMemory
 from flownav.navigation.tape import IMU_DOUBTED
@@ -33,7 +33,6 @@ with_shaking = replacing(ImuMemory, "doubt_m_s2", "shaken_most")
 # of 0.68
 TWICE, FADING_S = 2.0, 300.0
 
-BIAS_LIMIT_SIGMAS = 3.0  # standard deviations that a limit leaves room for: chosen, as in `settings_of`
 # The ground has followed a height that errs: as many times what the range still contradicts may both be off. With 1 the
 # height of `flownav faults --offline --faults imu_bias` is beyond 3 sigma for 12 s undetected, with 3 for 1 s.
 WITH_GROUND = 3.0

@@ -92,15 +92,18 @@ with_withheld = replacing(Arrival, "withheld")
 waiting_until = replacing(Equipment, "deadline_s")
 
 
-def fresh_rows() -> tuple[NDArray[np.uint16], Array]:
-    """The rows of a new navigator that are not 0, in numbers as short as a small board likes, and their values."""
+def fresh_rows() -> tuple[NDArray[np.uint16], NDArray[np.uint8], Array]:
+    """The rows of a new navigator that are not 0, which of the distinct values each has, and these values, bit by bit:
+    in numbers as short as a small board likes.
+    """
     work = new_work(ONE_LANE)[:BOARD_ROWS].reshape(-1, 1)
     BOARD.put_fresh(work)
-    places = np.flatnonzero(work[:, 0] != 0.0)
-    return places.astype(np.uint16), np.ascontiguousarray(work[places, 0])
+    rows = np.flatnonzero(work[:, 0] != 0.0)
+    bits, kinds = np.unique(np.ascontiguousarray(work[rows, 0]).view(np.uint64), return_inverse=True)
+    return rows.astype(np.uint16), kinds.astype(np.uint8), bits.view(np.float64)
 
 
-FRESH_ROWS, FRESH_VALUES = fresh_rows()
+FRESH_ROWS, FRESH_KINDS, FRESH_VALUES = fresh_rows()
 
 
 # -- the beginning ------------------------------------------------------------------------------------------
@@ -110,7 +113,7 @@ def begin_anew(work: Work, r: Work, p: Work) -> None:
     for i in range(BOARD_ROWS):
         work[i] = 0.0
     for i in range(len(FRESH_ROWS)):
-        work[FRESH_ROWS[i]] = FRESH_VALUES[i]
+        work[FRESH_ROWS[i]] = FRESH_VALUES[FRESH_KINDS[i]]
     if load_pace(p).protects == 0.0:
         work[HYPOTHESES] = 0.0
     waiting.empty(r)

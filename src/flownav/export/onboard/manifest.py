@@ -18,7 +18,7 @@ DIGEST = re.compile(r"[0-9a-f]{16}")
 
 def manifest_of(folder: Path) -> dict[str, Any]:
     """A folder's manifest. InputError where it is none of `flownav build`."""
-    found = object_in(folder / MANIFEST, "give a folder of `flownav build`")
+    found = object_in(folder / MANIFEST, f"{folder} is not a folder of `flownav build`")
     wrong = next((name for name, holds in ENTRIES.items() if name not in found or not holds(found[name])), None)
     if wrong is not None:
         why = "is missing" if wrong not in found else "is not as it is written"

@@ -241,7 +241,7 @@ All flight.* and flight-csv are of one flight: a quadrotor takes off, flies legs
 at 1 to 2 m/s and 1.5 to 2.5 m, returns and lands, in 100 s of light wind.
 Its sensors: GPS (2 m CEP, fixes 0.22 s old), flow with a gyro, lidar range,
 IMU, magnetometer, barometer. Beside them stands the truth.
-The flow sensor reads 12 % too little (gain 0.88): `flownav identify` finds that.
+The flow sensor reads 12 % too little (gain 0.88): `flownav identify` shows it.
 A reading is 64 ms old when it arrives, which takes faster motion to show: the
 flight shows it too vaguely, the swinging rig shows its own sensor's.
 The autopilot's estimate in flight.ulg is that of flownav's navigator, which

@@ -32,7 +32,6 @@ from flownav.navigation.memory import (
 from flownav.navigation.now import tell_now
 from flownav.navigation.offers import too_old
 from flownav.navigation.packed import load_equipment
-from flownav.navigation.place import settle
 from flownav.navigation.progress import (
     ADVANCING,
     BEHIND,
@@ -72,12 +71,12 @@ STEPS_A_CALL = 4.0  # of 0.1 s through a gap
 # or it has done nothing.
 BUDGET = 145.0
 COST_OF_STEP, COST_OF_ARRIVING, COST_OF_LEAVING = 17.0, 11.0, 4.0
-COST_OF_HOLDING, COST_OF_CLOSING, COST_OF_SETTLING = 70.0, 120.0, 90.0
+COST_OF_HOLDING, COST_OF_CLOSING = 70.0, 120.0
 COST_OF_TAKING = np.zeros(max(Sensor) + 1)
 for _sensor, _cost in (
     (Sensor.GPS_POSITION, 100.0), (Sensor.GPS_VELOCITY, 120.0), (Sensor.FLOW_RATE, 70.0), (Sensor.FLOW_VELOCITY, 70.0),
     (Sensor.RANGE, 45.0), (Sensor.BARO, 45.0), (Sensor.ATTITUDE, 115.0), (Sensor.MAG, 60.0), (Sensor.YAW, 60.0),
-    (Sensor.POSE, 130.0), (Sensor.PAD, 130.0), (Sensor.LANDED, 90.0),
+    (Sensor.POSE, 130.0), (Sensor.PAD, 130.0), (Sensor.LANDED, 130.0),
 ):  # fmt: skip
     COST_OF_TAKING[_sensor] = _cost
 
@@ -141,12 +140,10 @@ def cost_of(work: Work, m: Progress) -> float:
         return cost
     if m.part == CLOSING:
         return COST_OF_CLOSING
-    if m.sensor == LANDED:
-        return COST_OF_SETTLING
     return COST_OF_HOLDING if m.sensor == IMU and is_hold_due(work, ONE_LANE, m.t_s) else COST_OF_LEAVING
 
 
-IMU, LANDED = float(Sensor.IMU), float(Sensor.LANDED)
+IMU = float(Sensor.IMU)
 
 
 @equation
@@ -159,8 +156,6 @@ def do_part(work: Work, lanes: Lanes, m: Progress, p: Work, o: Output) -> None:
         take(work, lanes, m.t_s, int(m.sensor), fitted, p, o)
         store_progress(work, ONE_LANE, 0, with_part(m, part=LEAVING))
     elif m.part == LEAVING:
-        if m.sensor == LANDED:
-            settle(work, lanes, m.t_s, p, o)
         ended = hold_stand(work, lanes, m.t_s, p, o) if m.sensor == IMU else 0.0
         if ended > 0.0:
             store_progress(work, ONE_LANE, 0, with_ended(m, part=CLOSING, ended=ended))

@@ -146,8 +146,8 @@ def tie_to_pad(reading: Reading, m: PadMemory) -> Offer:
 
 @procedure
 def take_landed(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
-    """On the ground: no velocity. In flight, nothing; nor where a range, a receiver or the flow shows that it flies: a
-    report of "landed" is one witness among them. `settle` follows.
+    """On the ground: no velocity, and before a flight the pad is where the vehicle stands. In flight, nothing; nor
+    where a range, a receiver or the flow shows that it flies: a report of "landed" is one witness among them.
     """
     s = load_place_settings(p)
     for axis in range(3):
@@ -157,12 +157,6 @@ def take_landed(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: O
         note_aid(work, lanes, t_s, o)
     disbelieve_landed(work, lanes)
     note_landed(work, lanes)
-
-
-@procedure
-def settle(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) -> None:
-    """After a report of whether it has landed: before a flight the pad is where the vehicle stands."""
-    s = load_place_settings(p)
     if stand_on_pad(work, lanes, t_s, o):
         for axis in range(3):
             tie_to_pad(work, lanes)

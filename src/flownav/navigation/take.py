@@ -49,7 +49,7 @@ from flownav.navigation.packed import (
     load_place_settings,
 )
 from flownav.navigation.pad import take_pad
-from flownav.navigation.place import settle, take_landed, take_pose
+from flownav.navigation.place import take_landed, take_pose
 from flownav.navigation.protection import set_levels
 from flownav.navigation.spikes import drop_spikes
 from flownav.navigation.start import runs, try_start
@@ -114,11 +114,9 @@ def arrive(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment,
 
 @equation
 def leave(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
-    """Finish after a reading is taken: test whether the vehicle stands, and on what; then `go_on`."""
+    """Finish after a reading is taken: test whether the vehicle stands; then `go_on`."""
     if sensor == Sensor.IMU:
         stand_still(work, lanes, t_s, p, o)
-    elif sensor == Sensor.LANDED:
-        settle(work, lanes, t_s, p, o)
     go_on(work, lanes, t_s, p, o)
 
 

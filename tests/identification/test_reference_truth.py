@@ -113,15 +113,13 @@ def test_a_reference_that_moves_steadily_while_the_vehicle_stands_drifts(tmp_pat
     assert drift_at_rest(flown, brief) is None
 
 
-def test_a_drift_that_only_the_rest_shows_is_no_offset_of_the_flow(tmp_path):
-    """Nose north and height kept: an offset of the flow and a drift of the reference look alike in flight."""
-    t_s = np.arange(0.0, 100.0, 0.02)
-    place = at_rest(t_s)
+def level_flight(folder, t_s, place, range_m, drift_m_s=0.0, offset_rad_s=0.0):
+    """A log of a vehicle that keeps nose north and height, whose reference drifts north, whose flow is offset there."""
     velocity = np.gradient(place, t_s, axis=0)
     still, one = np.zeros(len(t_s)), np.ones(len(t_s))
     force = np.gradient(velocity, t_s, axis=0)
-    range_m = np.where((t_s > 9.0) & (t_s < 91.0), 2.0, 0.12)
     seen = velocity[:, :2] / range_m[:, None] + 0.01 * np.random.default_rng(3).standard_normal((len(t_s), 2))
+    seen[:, 0] += offset_rad_s
     forces = "accel_x_m_s2,accel_y_m_s2,accel_z_m_s2"
     tables = {
         "imu.csv": (f"gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,{forces}", [*3 * [still], *force[:, :2].T, -9.8 * one]),
@@ -129,11 +127,18 @@ def test_a_drift_that_only_the_rest_shows_is_no_offset_of_the_flow(tmp_path):
         "flow.csv": ("flow_x_rad_s,flow_y_rad_s,gyro_x_rad_s,gyro_y_rad_s,quality",
                      [-seen[:, 1], seen[:, 0], still, still, 200.0 * one]),
         "range.csv": ("range_m,valid", [range_m, one]),
-        "truth.csv": ("x_m,y_m,z_m", [place[:, 0] + 0.1 * t_s, place[:, 1], -range_m]),
+        "truth.csv": ("x_m,y_m,z_m", [place[:, 0] + drift_m_s * t_s, place[:, 1], -range_m]),
     }  # fmt: skip
     for name, (header, columns) in tables.items():
         rows = np.column_stack([t_s, *columns])
-        np.savetxt(tmp_path / name, rows, delimiter=",", header="t_s," + header, comments="", fmt="%.9g")
+        np.savetxt(folder / name, rows, delimiter=",", header="t_s," + header, comments="", fmt="%.9g")
+    return folder
+
+
+def test_a_drift_that_only_the_rest_shows_is_no_offset_of_the_flow(tmp_path):
+    """Nose north and height kept: an offset of the flow and a drift of the reference look alike in flight."""
+    t_s = np.arange(0.0, 100.0, 0.02)
+    level_flight(tmp_path, t_s, at_rest(t_s), np.where((t_s > 9.0) & (t_s < 91.0), 2.0, 0.12), drift_m_s=0.1)
     unknown = measured(open_flight(tmp_path), "truth")
     assert unknown.offset is not None
     assert unknown.offset.y.value == pytest.approx(-0.05, abs=0.005)  # as it looks where nobody knows when it stood
@@ -141,3 +146,17 @@ def test_a_drift_that_only_the_rest_shows_is_no_offset_of_the_flow(tmp_path):
     known = measured(open_flight(tmp_path), "truth")
     assert known.offset is None
     assert "drifts by 0.10 m/s all the time" in known.flown.notes[-1]
+
+
+def test_a_landed_state_that_is_wrong_takes_no_offset_of_the_flow_away(tmp_path):
+    """Landed for six seconds of a straight leg: as steady as a reference that drifts, but not as slow as the offset."""
+    t_s = np.arange(0.0, 100.0, 0.02)
+    leg = np.clip(t_s, 40.0, 60.0) - 40.0
+    angle = 0.4 * (t_s - leg)
+    place = np.column_stack([3.0 * np.sin(angle) + 1.5 * leg, 3.0 * np.cos(angle), 0.0 * t_s])
+    level_flight(tmp_path, t_s, place, np.clip(0.5 * t_s - 0.4, 0.12, 2.0), offset_rad_s=0.05)
+    (tmp_path / "landed.csv").write_text("t_s,landed\n0,0\n45,1\n51,0\n")
+    found = measured(open_flight(tmp_path), "truth")
+    assert drift_at_rest(found.flown, open_flight(tmp_path).streams[Sensor.LANDED]) == pytest.approx(1.5, abs=0.01)
+    assert found.offset is not None
+    assert max(abs(found.offset.x.value), abs(found.offset.y.value)) == pytest.approx(0.05, abs=0.005)

@@ -51,6 +51,23 @@ def test_some_rows_that_are_elsewhere_are_left_out_together():
     assert notes[0].endswith("5 rows are far from the others and left out, at 10.00, 10.10, 10.20 s and later")
 
 
+@pytest.mark.parametrize("rows", [2, 5, 8])
+def test_a_leap_that_is_spread_over_rows_is_one_leap(rows):
+    by = np.clip((np.arange(len(T_S)) - 199.0) / rows, 0.0, 1.0)[:, None] * [20.0, -10.0, 0.0]
+    truth, notes = examined(table(PATH + by), "truth.csv")
+    kept = np.isin(T_S, truth["t_s"])
+    assert np.array_equal(np.flatnonzero(~kept), np.arange(200, 199 + rows))  # between its two places
+    assert np.abs(path_of(truth) - PATH[kept]).max() < 0.1 * rows * 3.5  # of its way meanwhile, 4 m/s, some is known
+    said, _, size_m = notes[-1].partition(" m at ")[0].rpartition(" ")
+    assert said == "truth.csv leaps by"
+    assert float(size_m) == pytest.approx(22.36, abs=0.2 * rows)
+
+
+def test_a_vehicle_that_flies_fast_does_not_leap():
+    fast = np.column_stack([np.cumsum(np.where((T_S > 5.0) & (T_S < 30.0), 3.0, 0.4)), 0.0 * T_S, -1.0 + 0.0 * T_S])
+    assert examined(table(fast), "x")[1] == ()
+
+
 def test_a_leap_is_named_and_what_follows_is_shifted_back():
     truth, notes = examined(table(changed(slice(200, None), [20.0, 10.0, 0.0])), "truth.csv")
     assert np.abs(path_of(truth) - PATH).max() < 0.15  # a tenth of a second at 4 m/s, of which the motion is known

@@ -2,6 +2,5 @@
 
 `server.py` serves it to this machine alone (`doors.py`: who may ask), `shelf.py` is its folder, `uploads.py` what is
 dropped in, `tasks.py` the commands that its buttons stand for, `jobs.py` these commands as child processes, and
-`warm.py` the process that stays warm for what must
-answer within a second. `static/` are its plain modules.
+`warm.py` the process that stays warm for what must answer within a second. `static/` has its plain modules.
 """

@@ -87,7 +87,10 @@ def examined(truth: Table, name: str) -> tuple[Table, tuple[str, ...]]:
 
 
 def leaps_of(t_s: Array, position: Array) -> list[Leap]:
-    """Where a path (n,), (n, 3) leaps. Rows that repeat the place before them are copies, or stand."""
+    """Where a path (n,), (n, 3) leaps. Rows that repeat the place before them are copies, or stand.
+
+    A leap that a tracker's own filter spreads over several rows is as many leaps, and the rows between them are strays.
+    """
     new = np.flatnonzero(np.concatenate([[True], (np.diff(position, axis=0) != 0.0).any(axis=1)]))
     if len(t_s) < 2 or len(new) < 2:
         return []
@@ -98,15 +101,25 @@ def leaps_of(t_s: Array, position: Array) -> list[Leap]:
     step_s = np.maximum(np.minimum(np.diff(at), since_s), 1e-6)
     found: list[Leap] = []
     speed = step / step_s[:, None]
-    for place in np.flatnonzero(np.linalg.norm(speed, axis=1) >= LEAST_LEAP_M_S):
-        before = speed[max(place - STEPS, 0) : place]
-        after = speed[place + 1 : place + 1 + STEPS]
+    fast = np.linalg.norm(speed, axis=1) >= LEAST_LEAP_M_S
+    for place in np.flatnonzero(fast):
+        first, last = _run(fast, step_s, int(place))
+        before, after = speed[max(first - STEPS, 0) : first], speed[last + 1 : last + 1 + STEPS]
         motions = [np.median(one, axis=0) for one in (before, after) if len(one)] or [np.zeros(3)]
         beyond = min((step[place] - motion * step_s[place] for motion in motions), key=lambda by: float(by @ by))
         size = float(np.linalg.norm(beyond))
         if size >= LEAST_LEAP_M and size >= LEAST_LEAP_M_S * step_s[place]:
             found.append(Leap(float(at[place + 1]), beyond))
     return found
+
+
+def _run(fast: NDArray[np.bool_], step_s: Array, place: int) -> tuple[int, int]:
+    """The first and the last of the fast steps around one; itself where they last: the vehicle is as fast as that."""
+    slow = np.flatnonzero(~fast)
+    after = int(np.searchsorted(slow, place))
+    first = int(slow[after - 1]) + 1 if after else 0
+    last = int(slow[after]) - 1 if after < len(slow) else len(fast) - 1
+    return (first, last) if step_s[first : last + 1].sum() < LEAST_PIECE_S else (place, place)
 
 
 def lasting(leaps: Sequence[Leap], t_s: Array, position: Array) -> list[Leap]:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.errors import InputError
-from flownav.core.measurement import Array, Sensor
+from flownav.core.measurement import Array, Sensor, Stream
 from flownav.lab.identification.descent import Structure
 from flownav.lab.identification.experiment import Experiment, experiment
 from flownav.lab.identification.findings import Findings, Noise, Response, noise_of
@@ -130,8 +130,7 @@ def measured(log: Log, reference: str = "auto") -> Measured:
         age_s = _age(flown, moved)
     scale, track = _scale(flown, moved, age_s, put_right)
     offset = flow_offset(flown, moved, put_right, scale.response, age_s)
-    doubted, landed = offset is not None and offset.matters, log.streams.get(Sensor.LANDED)
-    drift_m_s = (drift_throughout(flown, moved) or drift_at_rest(flown, landed)) if doubted else None
+    drift_m_s = _drift_for(offset, flown, moved, log.streams.get(Sensor.LANDED))
     if drift_m_s is not None:
         drifting = f"the reference: {flown.reference_name} drifts by {drift_m_s:.2f} m/s all the time"
         note = f"{drifting}; no offset of the flow is identified"
@@ -140,6 +139,20 @@ def measured(log: Log, reference: str = "auto") -> Measured:
         put_right = without(put_right, flown.range_m, offset)
         scale, track = _scale(flown, moved, age_s, put_right)
     return Measured(flown, moved, raw, axes, put_right, scale, track, offset)
+
+
+def _drift_for(offset: Offset | None, flown: Flight, moved: Motion, landed: Stream | None) -> float | None:
+    """The speed of a reference that drifts, where that is what looks like an offset of the flow [m/s]; else None.
+
+    A landed state alone does not show it, for it may be wrong: the drift must be as large as the offset looks.
+    """
+    if offset is None or not offset.matters:
+        return None
+    if (drift_m_s := drift_throughout(flown, moved)) is not None:
+        return drift_m_s
+    drift_m_s = drift_at_rest(flown, landed)
+    looks_m_s = float(np.hypot(offset.x.value, offset.y.value) * np.median(flown.range_m[flown.good]))
+    return drift_m_s if drift_m_s is not None and 0.5 * looks_m_s <= drift_m_s <= 2.0 * looks_m_s else None
 
 
 def _check_alike(flown: Flight, moved: Motion) -> None:

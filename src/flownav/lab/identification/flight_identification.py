@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.errors import InputError
-from flownav.core.measurement import Array, Sensor, Stream
+from flownav.core.measurement import Array, Sensor
 from flownav.lab.identification.descent import Structure
 from flownav.lab.identification.experiment import Experiment, experiment
 from flownav.lab.identification.findings import Findings, Noise, Response, noise_of
@@ -34,7 +34,7 @@ from flownav.lab.identification.reference_motion import (
     flow_likeness,
     with_flow,
 )
-from flownav.lab.identification.reference_truth import drift_at_rest, drift_throughout
+from flownav.lab.identification.reference_truth import drift_like
 from flownav.lab.identification.scale import Match, against_speed, match
 from flownav.logs.log import Log
 from flownav.logs.open_log import open_flight
@@ -130,7 +130,7 @@ def measured(log: Log, reference: str = "auto") -> Measured:
         age_s = _age(flown, moved)
     scale, track = _scale(flown, moved, age_s, put_right)
     offset = flow_offset(flown, moved, put_right, scale.response, age_s)
-    drift_m_s = _drift_for(offset, flown, moved, log.streams.get(Sensor.LANDED))
+    drift_m_s = drift_like(offset, flown, moved, log.streams.get(Sensor.LANDED))
     if drift_m_s is not None:
         drifting = f"the reference: {flown.reference_name} drifts by {drift_m_s:.2f} m/s all the time"
         note = f"{drifting}; no offset of the flow is identified"
@@ -139,20 +139,6 @@ def measured(log: Log, reference: str = "auto") -> Measured:
         put_right = without(put_right, flown.range_m, offset)
         scale, track = _scale(flown, moved, age_s, put_right)
     return Measured(flown, moved, raw, axes, put_right, scale, track, offset)
-
-
-def _drift_for(offset: Offset | None, flown: Flight, moved: Motion, landed: Stream | None) -> float | None:
-    """The speed of a reference that drifts, where that is what looks like an offset of the flow [m/s]; else None.
-
-    A landed state alone does not show it, for it may be wrong: the drift must be as large as the offset looks.
-    """
-    if offset is None or not offset.matters:
-        return None
-    if (drift_m_s := drift_throughout(flown, moved)) is not None:
-        return drift_m_s
-    drift_m_s = drift_at_rest(flown, landed)
-    looks_m_s = float(np.hypot(offset.x.value, offset.y.value) * np.median(flown.range_m[flown.good]))
-    return drift_m_s if drift_m_s is not None and 0.5 * looks_m_s <= drift_m_s <= 2.0 * looks_m_s else None
 
 
 def _check_alike(flown: Flight, moved: Motion) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from flownav.core.measurement import Array, Stream
 from flownav.lab.identification.flight import LEAST_FLOW, Flight
+from flownav.lab.identification.offset import Offset
 from flownav.lab.identification.reference_motion import Motion, on_grid
 from flownav.logs.log import mean_over
 from flownav.logs.references import lasting, leaps_of, listed
@@ -180,3 +181,17 @@ def _solved(flow: Array, *columns: Array) -> tuple[Array, float]:
     design = np.column_stack(columns)
     factors = np.asarray(np.linalg.lstsq(design, flow, rcond=None)[0])
     return factors, float(np.sum(np.abs(flow - design @ factors) ** 2))
+
+
+def drift_like(offset: Offset | None, flown: Flight, moved: Motion, landed: Stream | None) -> float | None:
+    """The speed of a reference that drifts, where that is what looks like an offset of the flow [m/s]; else None.
+
+    A landed state alone does not show it, for it may be wrong: the drift must be as large as the offset looks.
+    """
+    if offset is None or not offset.matters:
+        return None
+    if (drift_m_s := drift_throughout(flown, moved)) is not None:
+        return drift_m_s
+    drift_m_s = drift_at_rest(flown, landed)
+    looks_m_s = float(np.hypot(offset.x.value, offset.y.value) * np.median(flown.range_m[flown.good]))
+    return drift_m_s if drift_m_s is not None and 0.5 * looks_m_s <= drift_m_s <= 2.0 * looks_m_s else None

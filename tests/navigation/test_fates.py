@@ -81,9 +81,13 @@ REFUSED = verdicts.Tested(INNOVATION_GATE, 1e3, 1.0, 0.25)
 OFTEN = WitnessMemory(times=30.0, since_s=0.0)
 
 
-def fate(tested=REFUSED, axis=1, position=True, flow=None, ranged=None, pad=0.0, arrived=1.0, often=OFTEN):
+def fate(
+    tested=REFUSED, axis=1, position=True, flow=None, ranged=None, pad=0.0, arrived=1.0, often=OFTEN,
+    agreed_s=-math.inf, agrees_since_s=-math.inf,
+):  # fmt: skip
+    along = AlongAxis(2.0, 3.0, 0.01, 1.5, agreed_s, agrees_since_s, 0.5, 0.04)
     return judge_fate.law(
-        tested, reading(10.0, 20.0, 30.0, arrived=arrived), AlongAxis(2.0, 3.0, 0.5, 0.04), flow or FlowMemory(),
+        tested, reading(10.0, 20.0, 30.0, arrived=arrived), along, flow or FlowMemory(),
         ranged or RangeMemory(), FixMemory(often, GpsMemory(moved_n_m=1.0, moved_e_m=2.0), PadMemory(pad)), t_s=99.0,
         place=OF_GPS + (axis if position else 3 + axis), s=TOLD.gps,
     )  # fmt: skip
@@ -109,7 +113,7 @@ def test_a_velocity_that_is_refused_for_long_goes_to_the_fix_and_moves_no_positi
 
 @pytest.mark.parametrize("position", [True, False])
 def test_what_leapt_along_down_is_not_followed_while_the_range_holds_the_height(position):
-    """A range that is refused too holds nothing, and neither does flow; what crept, and is a velocity, is followed."""
+    """A range that is refused too holds nothing, and neither does flow; what crept is followed."""
     leapt = WitnessMemory(times=30.0, since_s=80.0, fused_s=79.0, leapt=1.0)
     held, refused = RangeMemory(taken_s=98.9), RangeMemory(taken_s=98.9, refused_s=90.0)
     assert placed(fate(axis=2, position=position, ranged=held, often=leapt).goes) == []
@@ -117,7 +121,56 @@ def test_what_leapt_along_down_is_not_followed_while_the_range_holds_the_height(
     assert placed(fate(axis=2, position=position, flow=FlowMemory(taken_s=98.9), often=leapt).goes)
     assert placed(fate(axis=1, position=position, ranged=held, often=leapt).goes)
     crept = leapt._replace(leapt=0.0)
-    assert bool(placed(fate(axis=2, position=position, ranged=held, often=crept).goes)) != position
+    assert placed(fate(axis=2, position=position, ranged=held, often=crept).goes)
+    first = fate(axis=2, position=position, ranged=held, often=WitnessMemory(fused_s=97.6))
+    late = fate(axis=2, position=position, ranged=held, often=WitnessMemory(fused_s=97.4))
+    assert (first.memory.witness.leapt, late.memory.witness.leapt) == (1.0, 0.0)
+
+
+LEAPT = WitnessMemory(times=300.0, since_s=35.0, fused_s=34.8, leapt=1.0)  # JUMPED_S ago, and a moment before fused
+
+
+def test_a_position_whose_velocity_agrees_is_off_itself_and_its_slow_error_takes_it():
+    """The position and the pad stay, the level holds nothing of it, and no reset is written."""
+    found = fate(often=LEAPT, agreed_s=98.8, pad=LEFT)
+    assert placed(found.goes) == [(GPS_SLOW + 1, 1001.5)]
+    assert found.goes[0].variance == pytest.approx(TOLD.gps.gps_slow_sigma_m**2)
+    assert found.event.kind == -1
+    assert not found.pad_goes
+    assert found.tie.reason == SILENT
+    assert (found.memory.gps.moved_n_m, found.memory.gps.moved_e_m) == (1.0, 2.0)
+    assert (found.memory.witness.times, found.memory.witness.fused_s) == (0.0, 99.0)
+    early = fate(often=LEAPT._replace(since_s=40.0), agreed_s=98.8)
+    assert placed(early.goes) == []
+    assert early.memory.witness.fused_s == 34.8
+
+
+def test_who_is_off_is_decided_by_flow_where_the_velocity_is_silent_or_was_refused_itself():
+    flows, slow, all_of_it = FlowMemory(taken_s=98.9), [GPS_SLOW + 1], [GPS_SLOW + 1, GPS_FAST + 1, POSITION + 1]
+
+    def gone(**case) -> list[int]:
+        return [state for state, _ in placed(fate(often=LEAPT, **case).goes)]
+
+    assert gone(flow=flows) == slow
+    assert gone(agreed_s=97.0) == all_of_it
+    assert gone(agreed_s=98.8, agrees_since_s=35.0) == all_of_it
+    assert gone(agreed_s=98.8, agrees_since_s=34.0) == slow
+    assert gone(agreed_s=98.8, flow=FlowMemory(doubted=1.0)) == slow
+
+
+def test_what_a_velocity_could_have_moved_unseen_is_no_fault_of_the_receiver():
+    """0.1 m/s for 20 s are 2 m; the gate of 5 sigma of them and of 1 m is 11.2 m."""
+    quiet = WitnessMemory(fused_s=79.0)
+    silent = fate(verdicts.Tested(INNOVATION_GATE, 11.4, 1.0, 0.25), often=quiet, flow=FlowMemory(taken_s=98.9))
+    assert silent.memory.witness.leapt == 0.0  # flow, which may have failed meanwhile
+    for innovation_m, blamed in ((11.0, 0.0), (11.4, 1.0), (-11.4, 1.0)):
+        refused = verdicts.Tested(INNOVATION_GATE, innovation_m, 1.0, 0.25)
+        assert fate(refused, often=quiet, agreed_s=98.8).memory.witness.leapt == blamed
+        assert (
+            fate(refused, often=quiet._replace(times=3.0, since_s=80.0), agreed_s=98.8).memory.witness.leapt == blamed
+        )
+        later = fate(refused, often=quiet._replace(times=3.0, since_s=80.0, leapt=1.0))
+        assert later.memory.witness.leapt == 1.0
 
 
 def test_an_axis_that_is_refused_for_the_others_sake_alone_does_not_count():

@@ -57,12 +57,17 @@ with_reset = replacing(GpsMemory, "last_fix_s", "moved_n_m", "moved_e_m")
 
 # -- the filter's estimates -------------------------------------------------------------------------------------
 class AlongAxis(NamedTuple):
-    """The filter's estimate along an axis, NED: position [m], velocity [m/s], and the pad's offset with its variance
-    [m, m2].
+    """The filter's estimate along an axis, NED: position [m], velocity [m/s] with its variance [m2/s2], the slow error
+    of GPS [m], when a velocity of GPS was fused last and since when it agrees [s], and the pad's offset with its
+    variance [m, m2].
     """
 
     position_m: float
     velocity_m_s: float
+    velocity_variance: float
+    slow_m: float
+    agreed_s: float
+    agrees_since_s: float
     pad_off_m: float
     pad_variance: float
 
@@ -71,17 +76,23 @@ class AlongAxis(NamedTuple):
 def along_axis(work: Work, lanes: Lanes, axis: int, lane: int) -> AlongAxis:
     """The filter's estimate along an axis of a lane."""
     position_m = row_of(work, lanes, STATE + POSITION + axis, lane)
+    velocity = load_witness(work, lanes, OF_GPS + 3 + axis, lane)
     both = variance_of(work, lanes, POSITION + axis, lane) + variance_of(work, lanes, PAD + axis, lane)
     variance = both - 2.0 * covariance_of(work, lanes, PAD + axis, POSITION + axis, lane)
     return AlongAxis(
         position_m,
         row_of(work, lanes, STATE + VELOCITY + axis, lane),
+        variance_of(work, lanes, VELOCITY + axis, lane),
+        row_of(work, lanes, STATE + GPS_SLOW + axis, lane),
+        velocity.fused_s,
+        velocity.since_s,
         row_of(work, lanes, STATE + PAD + axis, lane) - position_m,
         larger(variance, LEAST_PAD_VARIANCE_M2),
     )
 
 
 MEMORY.derive(AlongAxis, along_axis, "axis")
+load_witness, _ = MEMORY.access(WitnessMemory)
 
 
 # -- one axis of a fix ----------------------------------------------------------------------------------------
@@ -147,42 +158,59 @@ def smooth_force(steady: SteadyForce) -> Force:
 
 # -- a fix that is refused ------------------------------------------------------------------------------------
 @equation
+def leaps(tested: Tested, ratio: float, position: bool, velocity_variance: float, since_s: float) -> bool:
+    """Whether a reading that is refused is too far off for any fault of the motion: then GPS itself is off.
+
+    since_s: time since one was fused. Nothing wrong puts a position within its gate, and so does a velocity that was
+    off by its own standard deviation all that time; what is beyond is neither, but for a false alarm of the gate (6e-7
+    at 5 sigma). A velocity must have leapt far out of its gate: a flow of the wrong sign leads one away, too.
+    """
+    moved = velocity_variance * since_s * since_s
+    return ratio * tested.total > tested.total + moved if position else ratio > LEAPT_RATIO
+
+
+@equation
 def judge_rejections(
-    ratio: float, position: bool, doubted: bool, t_s: float, m: WitnessMemory, s: GpsSettings, seen: bool = False
-) -> tuple[bool, WitnessMemory]:
+    ratio: float, position: bool, doubted: bool, t_s: float, m: WitnessMemory, s: GpsSettings, seen: bool = False,
+    leapt_now: bool = False,
+) -> tuple[bool, WitnessMemory]:  # fmt: skip
     """Whether GPS has been refused for a state so often and so long that the filter is wrong, and the count.
 
     ratio: its test ratio where it is refused, else 0. position: or else it is a velocity, for which SOON_S is long
-    enough, as it is where flow, which else would hold the filter, is doubted. seen: flow that is not doubted, or along
-    down the range, has carried the state since GPS was fused last. If that was a moment before the first refusal, it is
-    GPS that jumped: for JUMPED_S it is not followed. A velocity must have leapt out of its gate for that: a flow of the
-    wrong sign leads one away, too.
+    enough, as it is where flow, which else would hold the filter, is doubted. seen: another witness carries the state.
+    leapt_now: GPS is off by `leaps`, of a velocity by the first refusal: for JUMPED_S it is not followed then. since_s
+    stays when it is over, and is the end of a silence or a long refusal.
     """
     refused = ratio > 1.0
     first = not m.times > 0.0
     since_s = t_s if first else m.since_s
-    leapt = (1.0 if ratio > LEAPT_RATIO else 0.0) if first else m.leapt
+    leapt = 1.0 if leapt_now and (first or position) else (0.0 if first else m.leapt)
     count = m.times + 1.0
-    jumped = seen and since_s - m.fused_s <= MOMENT_S and (position or leapt > 0.0)
-    patience_s = JUMPED_S if jumped else (s.gps_reset_s if position and not doubted else smaller(s.gps_reset_s, SOON_S))
+    soon = not position or doubted
+    patience_s = JUMPED_S if seen and leapt > 0.0 else (smaller(s.gps_reset_s, SOON_S) if soon else s.gps_reset_s)
     reset = refused and count >= LEAST_REJECTIONS and t_s - since_s >= patience_s
-    return reset, with_refusal(m, times=count if refused and not reset else 0.0, since_s=since_s, leapt=leapt)
+    last_s = m.since_s if t_s - m.fused_s <= MOMENT_S else t_s
+    times = count if refused and not reset else 0.0
+    return reset, with_refusal(m, times=times, since_s=since_s if refused else last_s, leapt=leapt)
 
 
 @equation
 def gone_to_gps(
-    value: float, noise: float, axis: int, position: bool, goes: bool, s: GpsSettings
+    value: float, noise: float, axis: int, position: bool, goes: bool, off: bool, s: GpsSettings
 ) -> tuple[Reset, Reset, Reset]:
-    """A state goes to the fix, and the fix's lasting errors are forgotten: a position's two, or a velocity's."""
+    """A state goes to the fix, and the fix's lasting errors are forgotten: a position's two, or a velocity's.
+
+    off: it is the fix that is off, by its slow error, which goes to the value instead.
+    """
     slow = s.gps_slow_sigma_down_m if axis == 2 else s.gps_slow_sigma_m
     fast = s.gps_fast_sigma_down_m if axis == 2 else s.gps_fast_sigma_m
     velocity = s.gps_velocity_sigma_down_m_s if axis == 2 else s.gps_velocity_sigma_m_s
     first = slow if position else velocity
     lasting = slow * slow + fast * fast if position else velocity * velocity
     return (
-        Reset((GPS_SLOW if position else GPS_VELOCITY) + axis if goes else -1, 0.0, first * first),
-        Reset(GPS_FAST + axis if goes and position else -1, 0.0, fast * fast),
-        Reset((POSITION if position else VELOCITY) + axis if goes else -1, value, lasting + noise),
+        Reset((GPS_SLOW if position else GPS_VELOCITY) + axis if goes else -1, value if off else 0.0, first * first),
+        Reset(GPS_FAST + axis if goes and position and not off else -1, 0.0, fast * fast),
+        Reset((POSITION if position else VELOCITY) + axis if goes and not off else -1, value, lasting + noise),
     )
 
 
@@ -216,10 +244,15 @@ def judge_fate(
     ratio = gate_ratio(tested, s.gate_sigma) if tested.reason == INNOVATION_GATE else 0.0
     flowed = not doubted and t_s - flow.taken_s <= MOMENT_S
     above = not np.isfinite(ranged.refused_s) and t_s - ranged.taken_s <= MOMENT_S
-    seen = above if axis == 2 else flowed
-    reset, after = judge_rejections(ratio, position, doubted, t_s, m, s, seen)
-    after = with_fused(after, fused_s=t_s) if tested.reason == FUSED else after
-    goes = here and reset
+    agrees = position and t_s - along.agreed_s <= MOMENT_S and along.agrees_since_s <= m.fused_s
+    seen = agrees or (above if axis == 2 else flowed)
+    fused_s = t_s - m.fused_s
+    leapt_now = leaps(tested, ratio, position, along.velocity_variance, fused_s) and (agrees or fused_s <= MOMENT_S)
+    reset, after = judge_rejections(ratio, position, doubted, t_s, m, s, seen, leapt_now)
+    off = position and seen and after.leapt > 0.0
+    after = with_fused(after, fused_s=t_s) if tested.reason == FUSED or (reset and off) else after
+    resets = here and reset
+    goes = resets and not off
     by = value - (along.position_m if position else along.velocity_m_s)
     moved = by if goes and position else 0.0  # whether GPS jumped or the filter was wrong is unknown
     pad_goes = goes and position and not doubted and pad.known > 0.0
@@ -234,7 +267,9 @@ def judge_fate(
             ),
             pad,
         ),
-        gone_to_gps(value, tested.variance, axis, position, goes, s),
+        gone_to_gps(
+            along.slow_m + tested.innovation if off else value, tested.variance, axis, position, resets, off, s
+        ),
         Event(GPS_RESET if goes else -1, by),
         Reset(PAD + axis if pad_goes else -1, value + along.pad_off_m, UNKNOWN_M * UNKNOWN_M),
         Offer(

@@ -209,7 +209,7 @@ class WitnessMemory(NamedTuple):
     readings: float = 0.0
     known: float = 0.0
     times: float = 0.0
-    since_s: float = 0.0
+    since_s: float = -inf
     fused_s: float = -inf
     leapt: float = 0.0
 

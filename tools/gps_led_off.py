@@ -1,14 +1,17 @@
-"""A GPS position that is led off while its velocity stays right: when it is doubted, and how far it has led by then.
+"""A GPS position that is led off while its velocity stays right: when it is doubted, how far it has led by then, and
+whether the protection level holds meanwhile.
 
-Flights and navigator are those of `tools/integrity.py`, from 1.5 and 3 m; a position that goes off at each rate for a
-minute. Led off is how far the estimate moved against the same flight without. Doubted is `filter suspects`, or the
-tenth fix that is refused. python tools/gps_led_off.py [SEEDS]
+Flights and navigator are those of `tools/integrity.py`. The first table is of flights from 1.5 and 3 m with a position
+that goes off at each rate for a minute. Led off is how far the estimate moved against the same flight without. Doubted
+is `filter suspects`, or the tenth fix that is refused. The others count as `make integrity` does, for drifts and a leap
+of 5 s and of a minute. `make integrity` writes them into a page: python tools/gps_led_off.py PAGE [SEEDS]
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -16,14 +19,20 @@ import numpy as np
 from flownav.campaigns.faults.catalogue import Fault
 from flownav.campaigns.faults.inject import displaced
 from flownav.campaigns.faults.navigator import Navigate, Navigated, navigator_with
-from flownav.campaigns.faults.table import BASE, flight_at, window_start
+from flownav.campaigns.faults.table import BASE, DURATIONS_S, flight_at, window_start
+from flownav.core.errors import FlownavError
+from flownav.core.files import written_whole
 from flownav.core.measurement import Sensor
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario
+from integrity import LONG_S, counted, fly, placed, rows_of, table
 
 RATES_M_S = (0.2, 0.3, 0.5, 0.75, 1.0, 2.0, 5.0)
 HEIGHTS_M, LASTS_S, FIRST_SEED, SEEDS = (1.5, 3.0), 60.0, 1000, 6
 REFUSALS = 10  # that are a doubt: 2 s of a receiver of 5 Hz
+LEVEL_SEEDS = 4
+LEAP_M = 20.0  # beside good flow
+BEGIN, END = "<!-- make integrity, led off: begin -->", "<!-- make integrity, led off: end -->"
 
 
 class Led(NamedTuple):
@@ -31,6 +40,16 @@ class Led(NamedTuple):
 
     doubted_s: float
     led_m: float
+
+
+def led_off(rate_m_s: float) -> Fault:
+    """A position that goes off at this rate, its velocity right."""
+    return Fault(f"{rate_m_s:g}_m_s", "", (Sensor.GPS_POSITION,), displaced(0.0, rate_m_s))
+
+
+def leap() -> Fault:
+    """A position that leaps and stays, its velocity right."""
+    return Fault(f"leap_of_{LEAP_M:g}_m", "", (Sensor.GPS_POSITION,), displaced(LEAP_M, 0.0))
 
 
 def doubted_at(run: Navigated, t0_s: float) -> float:
@@ -45,7 +64,7 @@ def doubted_at(run: Navigated, t0_s: float) -> float:
 
 def flown(navigate: Navigate, rate_m_s: float, seeds: int) -> Iterator[Led]:
     """Every seed at every height."""
-    fault = Fault("led off", "", (Sensor.GPS_POSITION,), displaced(0.0, rate_m_s))
+    fault = led_off(rate_m_s)
     for seed in range(FIRST_SEED, FIRST_SEED + seeds):
         for height_m in HEIGHTS_M:
             streams, t0_s = flight_at(height_m, LASTS_S, seed).streams, window_start(height_m)
@@ -73,19 +92,40 @@ def row(rate_m_s: float, found: list[Led]) -> str:
     )
 
 
-def main(seeds: int) -> None:
-    """Print the table."""
+LED_HEADINGS = (
+    "| rate [m/s] | flights | doubted [%] | after, median [s] | led off, median [m] | most [m] | < 1 m [%] |\n"
+    "|---:|---:|---:|---:|---:|---:|---:|\n"
+)
+
+
+def section(navigate: Navigate, seeds: int, level_seeds: int) -> str:
+    """The tables with how they were made: when it is doubted, and how often the error is above the level."""
+    led = "".join(f"{row(rate_m_s, list(flown(navigate, rate_m_s, seeds)))}\n" for rate_m_s in RATES_M_S)
+    faults = (*(led_off(rate_m_s) for rate_m_s in (0.1, *RATES_M_S)), leap())
+    few, found = range(FIRST_SEED, FIRST_SEED + level_seeds), []
+    for lasts_s in (DURATIONS_S[-1], LONG_S):
+        rows = rows_of(counted(fly(navigate, few, (), faults, durations_s=(lasts_s,))))
+        found.append(f"Errors above the protection level, position led off for {lasts_s:g} s:\n\n{table(rows)}")
+    return f"Printed by `make integrity`, seeds from {FIRST_SEED}.\n\n{LED_HEADINGS}{led}\n" + "\n".join(found)
+
+
+def main(page: Path, seeds: int = SEEDS, level_seeds: int = LEVEL_SEEDS) -> None:
+    """Fly, print and write the tables. FlownavError where the page has no place for them."""
+    text = page.read_text(encoding="utf-8")
+    placed(text, "", str(page), BEGIN, END)
     fitted = assemble(load_scenario(BASE)).fitted
     assert fitted is not None
-    navigate = navigator_with(fitted.given)
-    print("| rate [m/s] | flights | doubted [%] | after, median [s] | led off, median [m] | most [m] | < 1 m [%] |")
-    print("|---:|---:|---:|---:|---:|---:|---:|")
-    for rate_m_s in RATES_M_S:
-        print(row(rate_m_s, list(flown(navigate, rate_m_s, seeds))), flush=True)
+    found = section(navigator_with(fitted.given), seeds, level_seeds)
+    print(found)
+    with written_whole(page) as temporary:
+        temporary.write_text(placed(text, found, str(page), BEGIN, END), encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":
     told = sys.argv[1:]
-    if len(told) > 1 or not all(count.isdecimal() and int(count) > 0 for count in told):
-        sys.exit("usage: python tools/gps_led_off.py [SEEDS]")
-    main(*map(int, told or [SEEDS]))
+    if len(told) not in (1, 2, 3) or not all(count.isdecimal() and int(count) > 0 for count in told[1:]):
+        sys.exit("usage: python tools/gps_led_off.py PAGE [SEEDS of the first table [SEEDS of the others]]")
+    try:
+        main(Path(told[0]), *map(int, told[1:]))
+    except (FlownavError, OSError) as error:
+        sys.exit(f"flownav: {error}")

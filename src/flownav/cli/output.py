@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import typer
 
 from flownav.core.errors import InputError
-from flownav.core.text import interval_words
+from flownav.core.text import harmless, interval_words
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -209,7 +209,7 @@ def table(
     for k, head in enumerate(heads):
         made.add_column(head, justify="left" if left is None or k < left else "right", no_wrap=k < fixed)
     for row in rows:
-        made.add_row(*row)
+        made.add_row(*map(harmless, row))
     return made
 
 
@@ -240,7 +240,7 @@ def say(*things: Any, wide: int = 0, soft: bool = False) -> None:
         console.width = max(console.width, wide)
     for thing in things:
         for part in fitted(thing, console) if isinstance(thing, Table) and known else (thing,):
-            console.print(part, soft_wrap=soft)
+            console.print(harmless(part) if isinstance(part, str) else part, soft_wrap=soft)
 
 
 LEAST_WORDS = 20  # columns that a column of words is not made narrower than

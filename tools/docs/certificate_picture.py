@@ -13,7 +13,7 @@ from pathlib import Path
 
 PICTURE = Path(__file__).parents[2] / "docs" / "pictures" / "certificate.png"
 SIZE_PX, SCALE = (1140, 2100), 0.75  # wide enough for two figures beside each other
-COLOURS = 64  # a page has few, and the file is a fifth as large
+COLOURS = 256  # enough for a page, and the file is a fraction as large
 
 
 def main(page: Path, out: Path = PICTURE) -> None:
@@ -29,7 +29,7 @@ def main(page: Path, out: Path = PICTURE) -> None:
         tab.wait_for_selector("html[data-figures=drawn]", state="attached", timeout=120_000)
         shown = Image.open(io.BytesIO(tab.screenshot()))
         opened.close()
-    shown.convert("RGB").quantize(COLOURS).save(out, optimize=True)
+    shown.convert("RGB").quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE).save(out, optimize=True)
 
 
 if __name__ == "__main__":

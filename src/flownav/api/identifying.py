@@ -90,7 +90,7 @@ def identify_logs(
 
 
 def identify_vehicle_log(log: Path, base: Path | None) -> tuple[Identified, dict[str, Any]]:
-    """Parameters that a flight's log shows of its vehicle, and the vehicle file's content. InputError where it shows nothing."""
+    """Parameters that a log shows of its vehicle, and the vehicle file's content. InputError where it shows nothing."""
     from flownav.lab.identification.commanded import HELICOPTER, read_commanded
     from flownav.lab.identification.vehicle_file import vehicle_entries
     from flownav.lab.identification.vehicle_parameters import identify_vehicle

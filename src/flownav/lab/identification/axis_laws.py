@@ -39,7 +39,7 @@ class AxisResponse(NamedTuple):
 
 
 def rotor_left(seen: AxisResponse, x: Array, pitch: bool, answers: float, nominal: NominalModel) -> Left:
-    """The rest that the rotor's law leaves at x: logarithms of ROTOR over their stated values, of the answer N of the servos,
+    """The rotor's rest at x: logarithms of ROTOR over their stated values, of the answer N of the servos,
     and of the cyclic by a command in pitch and in roll; then by how much the commands' stamps are late [s].
     """
     k = (nominal.pitch_stiffness_1_s2 if pitch else nominal.roll_stiffness_1_s2) * np.exp(x[0 if pitch else 1])
@@ -62,7 +62,7 @@ def rotor_left(seen: AxisResponse, x: Array, pitch: bool, answers: float, nomina
 
 
 def body_left(seen: AxisResponse, x: Array, stated: tuple[float, float]) -> Left:
-    """The rest that the multirotor's law leaves at x: logarithms of E and τ over their stated values, and d/BODY_DAMPING_1_S."""
+    """The multirotor's rest at x: logarithms of E and τ over their stated values, and d/BODY_DAMPING_1_S."""
     s = 1j * seen.w_rad_s
     effect, lag = stated[0] * np.exp(x[0]), stated[1] * np.exp(x[1])
     damped, late = s + BODY_DAMPING_1_S * x[2], 1.0 + s * lag

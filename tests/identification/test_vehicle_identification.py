@@ -275,3 +275,21 @@ def test_intervals_of_flown_vehicles_hold_their_truth(tmp_path):
     assert binom.cdf(inside, shown, 0.95) > 1e-6
     halved = int(np.sum(np.abs(true - value) <= 0.25 * (high - low)))
     assert binom.cdf(halved, shown, 0.95) < 1e-3
+
+
+def test_a_helicopters_file_has_the_stiffnesses_that_were_found():
+    """A soft hub is no heavy body: both stiffnesses at 0.7 of the stated ones would make inertias that cannot be."""
+    from flownav.lab.identification.quantities import Interval
+    from flownav.lab.identification.vehicle_parameters import Found, Identified
+    from flownav.vehicle.kinds import flattened, read_kind
+
+    stated = {"pitch_stiffness_1_s2": STATED.pitch_stiffness_1_s2, "roll_stiffness_1_s2": STATED.roll_stiffness_1_s2}
+    shares = {"pitch_stiffness_1_s2": 0.6, "roll_stiffness_1_s2": 0.9}
+    rows = tuple(
+        Found(key, key, "1/s2", Interval.of(shares[key] * value, 0.02 * value), "") for key, value in stated.items()
+    )
+    found = Identified(quad_flight(seconds=8.0)._replace(path=Path("a.fnr"), kind="helicopter", exact=True), rows, ())
+    vehicle = flattened(read_kind(vehicle_entries(found, "maxi-joker-3", "mine"), "mine"))
+    own = nominal_model(vehicle, trim(vehicle), -1)
+    for key, value in stated.items():
+        assert getattr(own, key) == pytest.approx(shares[key] * value, rel=1e-3)

@@ -7,6 +7,7 @@ motors', its thrust the propellers' coefficient, its drag theirs in the plane. T
 half of its 95 % interval, and says where it comes from.
 """
 
+import math
 from collections.abc import Iterator
 from copy import deepcopy
 from pathlib import Path
@@ -63,13 +64,21 @@ def _rotors(found: Identified, file: VehicleFile) -> Iterator[Entry]:
     hover = hover_of(vehicle)
     assert isinstance(hover, Trim)
     stated = nominal_model(vehicle, hover, -1)
-    for axis, key, own, inertia in (
-        ("roll", "inertia_xx_kg_m2", stated.roll_stiffness_1_s2, vehicle.inertia_xx_kg_m2),
-        ("pitch", "inertia_yy_kg_m2", stated.pitch_stiffness_1_s2, vehicle.inertia_yy_kg_m2),
+    roll, pitch = found.interval("roll_stiffness_1_s2"), found.interval("pitch_stiffness_1_s2")
+    stiffer, lever = 1.0, vehicle.hub_above_cg_m * hover.thrust_n
+    if roll is not None and pitch is not None:  # both together are the spring's, one against the other an inertia's
+        both = math.sqrt(roll.value / stated.roll_stiffness_1_s2 * pitch.value / stated.pitch_stiffness_1_s2)
+        spring = both * (vehicle.hub_stiffness_n_m_rad + lever)
+        if spring > lever:
+            stiffer, half = both, 0.25 * spring * math.hypot(_width(roll), _width(pitch))
+            hub = spring - lever
+            yield Entry("main_rotor.hub_stiffness_n_m_rad", Interval(hub, hub - half, hub + half), "stiffness")
+    for shown, key, own, axis in (
+        (roll, "inertia_xx_kg_m2", stated.roll_stiffness_1_s2 * vehicle.inertia_xx_kg_m2, "roll"),
+        (pitch, "inertia_yy_kg_m2", stated.pitch_stiffness_1_s2 * vehicle.inertia_yy_kg_m2, "pitch"),
     ):
-        stiffness = found.interval(f"{axis}_stiffness_1_s2")
-        if stiffness is not None:
-            yield Entry(f"body.{key}", _over(own * inertia, stiffness), f"{axis} stiffness")
+        if shown is not None:
+            yield Entry(f"body.{key}", _over(stiffer * own, shown), f"{axis} stiffness")
     rate, lag = found.interval("pitch_rate_by_cyclic_1_s"), found.interval("lag_s")
     if rate is None or not found.flight.exact:  # where the angles are not sure, a rate by cyclic shows no flapping
         return
@@ -110,6 +119,11 @@ def _propellers(found: Identified, file: MultirotorFile) -> Iterator[Entry]:
         yield Entry(
             "propeller.inplane_drag_n_s2_m_rad", _times(sure, vehicle.mass_kg / vehicle.rotor_count / speed), "drag"
         )
+
+
+def _width(interval: Interval) -> float:
+    """Of the interval over its value."""
+    return (interval.high - interval.low) / interval.value
 
 
 def _times(interval: Interval, factor: float) -> Interval:

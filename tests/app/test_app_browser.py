@@ -3,65 +3,26 @@
 from __future__ import annotations
 
 import re
-import socket
-import threading
-import time
-from typing import Any
 
 import pytest
 
-from app_desk import TOKEN, desk_of
-from flownav.app.doors import Doors
-from flownav.app.server import application, listening
+from app_desk import desk_of
+from app_pages import Tab, served
 from replay_logs import log_of_flight
 from ulog_files import ulog_of_flight
 
 pytestmark = pytest.mark.browser
-PATIENCE_MS = 120_000
 
 
 @pytest.fixture(scope="module")
-def address(tmp_path_factory):
-    """The page, served to a browser, with flownav's own worker and commands."""
-    pytest.importorskip("starlette", reason="install `starlette` (dependency group `test`)")
-    desk = desk_of(tmp_path_factory.mktemp("page"), real=True)
-    found: socket.socket = listening(0)
-    port = found.getsockname()[1]
-    uvicorn = pytest.importorskip("uvicorn", reason="install `uvicorn` (dependency group `test`)")
-    config = uvicorn.Config(Doors(application(desk), TOKEN, port), log_level="warning", ws="none", loop="asyncio")
-    server = uvicorn.Server(config)
-    thread = threading.Thread(target=server.run, kwargs={"sockets": [found]})
-    thread.start()
-    give_up = time.monotonic() + 60.0
-    while not server.started:
-        assert time.monotonic() < give_up
-        time.sleep(0.05)
-    yield f"http://127.0.0.1:{port}/{TOKEN}/"
-    server.should_exit = True
-    thread.join(60.0)
-    found.close()
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("page")
 
 
-class Tab:
-    """A tab, and what it complained of."""
-
-    def __init__(self, browser: Any, address: str, width: int = 1100, **options: Any) -> None:
-        self.width, self.complaints, self.asked = width, [], []
-        self.context = browser.new_context(viewport={"width": width, "height": 850}, **options)
-        self.context.set_default_timeout(PATIENCE_MS)
-        self.page = self.context.new_page()
-        self.page.on("console", lambda said: self.complaints.append(said.text) if said.type == "error" else None)
-        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.page.on("request", lambda request: self.asked.append(request.url))
-        self.page.goto(address)
-        self.page.wait_for_selector("html[data-ready=yes]", state="attached")
-
-    def close(self, address: str) -> None:
-        """Nothing was complained of, nothing was asked of anybody else, nothing sticks out."""
-        assert self.complaints == []
-        assert [url for url in self.asked if not url.startswith((address.split("#")[0], "data:"))] == []
-        assert self.page.evaluate("document.documentElement.scrollWidth") <= self.width
-        self.context.close()
+@pytest.fixture(scope="module")
+def address(folder):
+    with served(desk_of(folder, real=True)) as address:
+        yield address
 
 
 def test_a_log_is_dropped_in_explained_and_there_after_a_reload(browser, address):

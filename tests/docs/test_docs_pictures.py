@@ -12,7 +12,8 @@ import flownav
 from docs_tools import pictures, readme_picture
 from places import DOCS, PROJECT
 
-MADE_OTHERWISE = {"certificate", "rerun"}  # photographs of pages and of a viewer
+APP = {"app-logs", "app-jobs", "app-cut", "app-fly", "app-certify", "app-live-withheld", "app-live"}  # of flownav app
+MADE_OTHERWISE = {"certificate", "rerun"} | APP  # photographs of pages and of a viewer
 
 
 @pytest.mark.parametrize("picture", pictures.PICTURES, ids=lambda picture: picture.name)

@@ -24,7 +24,7 @@ from recorded_link import arrivals, play
 
 
 def looks(frames, every_s=0.5, options=None):
-    """The status at every so many seconds of a recording, and the session."""
+    """The status of a recording every half second, and the session."""
     found, last = [], [float("-inf")]
     status = None
 

@@ -144,8 +144,8 @@ def _navigate(
             return Screen(session, latency, url, recorder, scheduling, link)
 
         with stoppable() as asked:
-            told = Status(session, screen(), url, recorder.path if recorder else None, now_s)
-            with on_terminal(screen().view, shown=shown) as display, _status_file(status, told.look) as shows:
+            state = Status(session, screen(), url, recorder.path if recorder else None, now_s)
+            with on_terminal(screen().view, shown=shown) as display, _status_file(status, state.look) as shows:
                 shows += [display.show, *([facts_every_second(recorder, facts_now)] if recorder is not None else [])]
                 run_session(session, link, latency, lambda: asked() or time.monotonic() >= end_s, shows)
             run_as_others()

@@ -56,7 +56,7 @@ class Trail:
 
 
 class Status:
-    """What a session is doing, as JSON values. screen: looks at the same session, and at nothing else."""
+    """The doings of a session as JSON values. screen: looks at the same session, and at nothing else."""
 
     def __init__(self, session: Session, screen: Screen, url: str, record: Path | None, now_s: float) -> None:
         self._session, self._screen, self._url = session, screen, url
@@ -178,13 +178,13 @@ class StatusFile:
             self._path.unlink(missing_ok=True)
 
     def _run(self) -> None:
-        told = False
+        failed_once = False
         while (found := self._waiting.get()) is not None:
             try:
                 with written_whole(self._path) as temporary:
                     temporary.write_bytes(marked_json(found, indent=None))
             except (OSError, ValueError) as error:
-                if not told:
-                    told = True
+                if not failed_once:
+                    failed_once = True
                     self._failed(getattr(error, "strerror", None) or str(error))
             self._idle = True

@@ -15,7 +15,7 @@ from flownav.app.desk import Desk
 from flownav.app.doors import Doors
 from flownav.app.server import application, listening
 
-PATIENCE_MS = 120_000
+PATIENCE_MS = 240_000  # a machine that has no time takes longer
 
 
 @contextmanager

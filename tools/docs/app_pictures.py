@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -56,10 +57,11 @@ class Camera:
         self.page.locator("main").get_by_role("button", name=name, exact=True).first.click()
 
     def take(self, name: str) -> None:
-        """A photograph of what is on the page, without the list of jobs below it."""
-        self.page.evaluate("document.getElementById('jobs').style.display = 'none'")
-        shot = self.page.screenshot(full_page=True, animations="disabled")
-        self.page.evaluate("document.getElementById('jobs').style.display = ''")
+        """A photograph of what is on the page, without the list of jobs and the folder's name below it."""
+        hide = "(how) => document.querySelectorAll('#jobs, footer').forEach((each) => { each.style.display = how; })"
+        self.page.evaluate(hide, "none")
+        shot = self.page.locator("body").screenshot(animations="disabled")
+        self.page.evaluate(hide, "")
         picture = Image.open(io.BytesIO(shot)).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
         picture.save(self.folder / f"app-{name}.png", optimize=True)
 
@@ -86,7 +88,8 @@ def cut(camera: Camera) -> None:
     camera.page.mouse.down()
     camera.page.mouse.move(box["x"] + 0.75 * box["width"], box["y"] + 0.4 * box["height"], steps=5)
     camera.page.mouse.up()
-    camera.page.locator("tbody td:nth-child(2)", has_text=".").wait_for()
+    camera.page.locator("tbody td:nth-child(2)", has_text=re.compile(r"\d\.\d\d")).wait_for()
+    camera.page.get_by_text("answered in").wait_for()
     camera.take("cut")
 
 

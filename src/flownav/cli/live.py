@@ -193,7 +193,7 @@ def _recording(url: str, path: Path | None, options: Options, *, force: bool, sh
 
 @contextmanager
 def _status_file(path: Path | None, look: Callable[[float], dict[str, Any]]) -> Iterator[list[Callable[[float], None]]]:
-    """What the loop calls to have the status written; an empty list where none is asked for."""
+    """The functions that the loop calls to have the status written; none where none is asked for."""
     from flownav.live.status import StatusFile
 
     if path is None:

@@ -25,7 +25,10 @@ export function whole(now) {
   const here = now.here_ned_m;
   if (!here) return [el("figcaption", {}, "The path is drawn once the filter has started.")];
   const reach = now.protection_m ? now.protection_m[0] : 0;
-  const all = [...now.path, ...(now.pad_m ? [now.pad_m] : []), [here[0] - reach, here[1] - reach], [here[0] + reach, here[1] + reach]];
+  const flown = [...now.path, ...(now.pad_m ? [now.pad_m] : []), here];
+  const span = Math.max(...[0, 1].map((k) => Math.max(...flown.map((row) => row[k])) - Math.min(...flown.map((row) => row[k]))), LEAST_M);
+  const shown = Math.min(reach, span);  // a circle that is much wider than the path is cut off at the picture's edge
+  const all = [...flown, [here[0] - shown, here[1] - shown], [here[0] + shown, here[1] + shown]];
   const [n0, n1, e0, e1] = [0, 1].flatMap((k) => [Math.min(...all.map((row) => row[k])), Math.max(...all.map((row) => row[k]))]);
   const scale = (SIZE - 2 * MARGIN) / Math.max(n1 - n0, e1 - e0, LEAST_M);
   const at = ([north, east]) => [SIZE / 2 + scale * (east - (e0 + e1) / 2), SIZE / 2 - scale * (north - (n0 + n1) / 2)];

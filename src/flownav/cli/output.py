@@ -74,7 +74,7 @@ def place(path: Path, *inputs: str | Path | None, force: bool, beside: Sequence[
     from flownav.core.free_names import a_place
 
     found = a_place(path, _read(inputs), force=force, beside=beside)
-    _require_place(path)
+    require_place(path)
     return named_place(path, found)
 
 
@@ -90,7 +90,7 @@ def several_place(path: Path, *inputs: str | Path | None, force: bool) -> Path:
     from flownav.core.free_names import a_place_of_several
 
     found = a_place_of_several(path, _read(inputs), force=force)
-    _require_place(path)
+    require_place(path)
     return named_place(path, found)
 
 
@@ -103,7 +103,7 @@ def folder_place(path: Path, *inputs: str | Path | None, force: bool | None = No
 
     _read(inputs)
     found = a_folder_place(path, force=bool(force))
-    _require_place(path)
+    require_place(path)
     return named_place(path, found, replaces=force is not None)
 
 
@@ -126,10 +126,10 @@ def require_recordable(path: Path, *inputs: str | Path | None, force: bool) -> N
     from flownav.core.guard import a_record_place
 
     a_record_place(path, _read(inputs), force=force)
-    _require_place(path)
+    require_place(path)
 
 
-def _require_place(path: Path) -> None:
+def require_place(path: Path) -> None:
     """InputError where no file can be made in the folder that a path lies in, or in the nearest that is there."""
     there = next((parent for parent in path.absolute().parents if parent.exists()), path.absolute().parent)
     with writing(path), TemporaryFile(dir=there):

@@ -47,6 +47,7 @@ explain: $(VENV)/.ready
 
 integrity: $(VENV)/.ready
 	$(BIN)/python tools/integrity.py docs/explanation/integrity.md
+	$(BIN)/python tools/gps_led_off.py docs/explanation/integrity.md
 
 witnesses: $(VENV)/.ready
 	$(BIN)/python tools/witnesses.py docs/explanation/faults.md $(if $(SEEDS),--seeds $(SEEDS))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
@@ -122,3 +123,21 @@ def test_a_log_is_replayed_and_shown_without_the_simulator(tmp_path):
 def test_benchmark_samples_and_example_parts_are_loaded_where_they_are_asked_for_alone(code):
     apart = ("flownav.studies.benchmark.measures", "flownav.export.samples.kinds", "flownav.parts.examples")
     assert loaded_by(code, apart) == set()
+
+
+def test_a_command_gives_arrow_no_memory_pool_of_its_own():
+    """A flight keeps 14 MB less; who asks for another pool gets it."""
+    code = """
+import os, sys
+from flownav.__main__ import main
+sys.argv = ["flownav", "--version"]
+try:
+    main()
+except SystemExit:
+    pass
+import pyarrow
+print(pyarrow.default_memory_pool().backend_name)"""
+    for asked, expected in ({}, "system"), ({"ARROW_DEFAULT_MEMORY_POOL": "mimalloc"}, "mimalloc"):
+        outside = {name: value for name, value in os.environ.items() if name != "ARROW_DEFAULT_MEMORY_POOL"} | asked
+        done = subprocess.run([sys.executable, "-c", code], env=outside, capture_output=True, text=True, check=True)
+        assert done.stdout.splitlines()[-1] == expected

@@ -1,67 +1,39 @@
-"""The page in headless Chromium: a log is dropped in, explained and cut; two tabs; nothing sticks out or complains."""
+"""The page in headless Chromium: logs dropped in and cut; cancel, reload, a closed browser; other origins."""
 
 from __future__ import annotations
 
+import functools
+import http.server
+import json
 import re
-import socket
 import threading
-import time
-from typing import Any
 
 import pytest
 
-from app_desk import TOKEN, desk_of
-from flownav.app.doors import Doors
-from flownav.app.server import application, listening
+from app_desk import TOKEN, desk_of, until
+from app_pages import Tab, served
+from blackbox_logs import blackbox_log, quantised
+from command import run
+from crazyflie_logs import deck_log
+from crazyflie_logs import quantised as deck_tables
+from dataflash_files import dataflash_of
+from mavlink_logs import flight_log
 from replay_logs import log_of_flight
+from ros_bags import ros_flight
 from ulog_files import ulog_of_flight
 
 pytestmark = pytest.mark.browser
-PATIENCE_MS = 120_000
 
 
 @pytest.fixture(scope="module")
-def address(tmp_path_factory):
-    """The page, served to a browser, with flownav's own worker and commands."""
-    pytest.importorskip("starlette", reason="install `starlette` (dependency group `test`)")
-    desk = desk_of(tmp_path_factory.mktemp("page"), real=True)
-    found: socket.socket = listening(0)
-    port = found.getsockname()[1]
-    uvicorn = pytest.importorskip("uvicorn", reason="install `uvicorn` (dependency group `test`)")
-    config = uvicorn.Config(Doors(application(desk), TOKEN, port), log_level="warning", ws="none", loop="asyncio")
-    server = uvicorn.Server(config)
-    thread = threading.Thread(target=server.run, kwargs={"sockets": [found]})
-    thread.start()
-    give_up = time.monotonic() + 60.0
-    while not server.started:
-        assert time.monotonic() < give_up
-        time.sleep(0.05)
-    yield f"http://127.0.0.1:{port}/{TOKEN}/"
-    server.should_exit = True
-    thread.join(60.0)
-    found.close()
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("page")
 
 
-class Tab:
-    """A tab, and what it complained of."""
-
-    def __init__(self, browser: Any, address: str, width: int = 1100, **options: Any) -> None:
-        self.width, self.complaints, self.asked = width, [], []
-        self.context = browser.new_context(viewport={"width": width, "height": 850}, **options)
-        self.context.set_default_timeout(PATIENCE_MS)
-        self.page = self.context.new_page()
-        self.page.on("console", lambda said: self.complaints.append(said.text) if said.type == "error" else None)
-        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.page.on("request", lambda request: self.asked.append(request.url))
-        self.page.goto(address)
-        self.page.wait_for_selector("html[data-ready=yes]", state="attached")
-
-    def close(self, address: str) -> None:
-        """Nothing was complained of, nothing was asked of anybody else, nothing sticks out."""
-        assert self.complaints == []
-        assert [url for url in self.asked if not url.startswith((address.split("#")[0], "data:"))] == []
-        assert self.page.evaluate("document.documentElement.scrollWidth") <= self.width
-        self.context.close()
+@pytest.fixture(scope="module")
+def address(folder):
+    with served(desk_of(folder, real=True)) as address:
+        yield address
 
 
 def test_a_log_is_dropped_in_explained_and_there_after_a_reload(browser, address):
@@ -119,3 +91,214 @@ def test_every_page_fits_a_phone_in_the_dark(browser, address, page):
     assert tab.page.locator("h1").count() == 1
     assert tab.page.get_attribute("nav a[aria-current]", "href") == f"#{page}"
     tab.close(address)
+
+
+# -- what is dropped in --------------------------------------------------------------------------------------------
+def row_of(tab, name):
+    return tab.page.locator(f"li[data-file='{name}']")
+
+
+def test_a_log_of_each_format_is_dropped_in_at_once_and_has_a_verdict_each(browser, address, tmp_path):
+    flown = log_of_flight(20.0)
+    files = {
+        "each.ulg": ulog_of_flight(flown.tables).bytes(),
+        "each.bin": dataflash_of(flown).content(),
+        "each.bbl": blackbox_log(quantised(flown.tables, inav=True), inav=True).content(),
+        "each00": deck_log(deck_tables(flown.tables)).content(),
+        "each.tlog": flight_log(6.0).content,
+        "each.bag": ros_flight(flown.tables).write_ros_1(tmp_path / "x.bag").read_bytes(),
+    }
+    tab = Tab(browser, f"{address}#logs")
+    kind = "application/octet-stream"
+    dropped = [{"name": name, "mimeType": kind, "buffer": content} for name, content in files.items()]
+    tab.page.set_input_files("#choose", dropped)
+    for name in files:
+        row_of(tab, name).locator(".verdict").first.wait_for()
+        assert row_of(tab, name).locator("svg.thumbnail polyline").count() == 1
+    flown.write(tmp_path / "csv")
+    tab.page.set_input_files("#choose-folder", tmp_path / "csv")
+    row_of(tab, "csv").locator(".verdict").first.wait_for()
+    tab.close(address)
+
+
+def test_sixty_megabytes_come_whole(browser, address, folder, tmp_path):
+    """A log, and behind it a message that no reader knows, over and over."""
+    log = ulog_of_flight(log_of_flight(20.0).tables).bytes()
+    unknown = (60_000).to_bytes(2, "little") + b"?" + bytes(60_000)
+    path = tmp_path / "large.ulg"
+    path.write_bytes(log + unknown * 1000)
+    assert path.stat().st_size > 60e6
+    tab = Tab(browser, f"{address}#logs")
+    tab.page.set_input_files("#choose", path)
+    tab.page.locator("li[data-file='large.ulg'] .verdict").wait_for()
+    assert (folder / "large.ulg").read_bytes() == path.read_bytes()
+    tab.page.get_by_role("button", name="Remove large.ulg").click()
+    tab.page.locator("li[data-file='large.ulg']").wait_for(state="detached")
+    tab.close(address)
+
+
+def slow_upload(tab, path):
+    """Choose a file for a link of 200 kB/s."""
+    session = tab.context.new_cdp_session(tab.page)
+    slow = {"offline": False, "latency": 0, "downloadThroughput": -1, "uploadThroughput": 200_000}
+    session.send("Network.enable")
+    session.send("Network.emulateNetworkConditions", slow)
+    tab.page.set_input_files("#choose", path)
+    tab.page.locator("ul.uploads progress").wait_for()
+
+
+@pytest.mark.parametrize("leaves", ["cancel", "reload", "close"])
+def test_an_upload_that_is_cancelled_or_left_leaves_nothing(browser, address, folder, tmp_path, leaves):
+    path = tmp_path / f"{leaves}.ulg"
+    path.write_bytes(b"x" * 30_000_000)
+    tab = Tab(browser, f"{address}#logs")
+    slow_upload(tab, path)
+    until(lambda: any(folder.glob(f".{leaves}*.part")))
+    if leaves == "cancel":
+        tab.page.locator("ul.uploads").get_by_role("button", name="Cancel").press("Enter")
+        tab.page.locator("ul.uploads li").wait_for(state="detached")
+        tab.close(address)
+    elif leaves == "reload":
+        tab.page.reload()
+        tab.ready()
+        tab.close(address)
+    else:
+        tab.context.close()
+    until(lambda: not any(folder.glob(f".{leaves}*")))
+    assert not (folder / path.name).exists()
+
+
+# -- jobs ----------------------------------------------------------------------------------------------------------
+def test_a_job_is_cancelled_by_the_keyboard_alone(browser, address):
+    tab = Tab(browser, f"{address}#fly")
+    many = tab.page.get_by_role("button", name="Fly 200")
+    many.focus()
+    tab.page.keyboard.press("Enter")
+    stop = tab.page.locator("main").get_by_role("button", name="Stop")
+    stop.wait_for()
+    stop.focus()
+    tab.page.keyboard.press("Space")
+    tab.page.locator("li.job.cancelled").wait_for()
+    tab.close(address)
+
+
+def test_the_pages_are_walked_through_with_tab_and_enter(browser, address):
+    tab = Tab(browser, f"{address}#logs")
+    tab.page.keyboard.press("Tab")
+    assert tab.page.evaluate("document.activeElement.textContent") == "Skip to the content"
+    for name in ("Logs", "Cut GPS", "Fly", "Certify", "Live"):
+        tab.page.keyboard.press("Tab")
+        assert tab.page.evaluate("document.activeElement.textContent") == name
+        outline = tab.page.evaluate("getComputedStyle(document.activeElement).outlineStyle")
+        assert outline == "solid", "who tabs sees where"
+        tab.page.keyboard.press("Enter")
+        tab.page.locator("nav a[aria-current]", has_text=name).wait_for()
+        tab.page.locator("h1").wait_for()
+    tab.close(address)
+
+
+def flights_of(tab):
+    """How many flights the campaign that is shown has flown, and is to fly."""
+    found = tab.page.locator("main [role=status]", has_text=re.compile(r"\d+ of \d+ flights, \d+ landed"))
+    return tuple(map(int, re.search(r"(\d+) of (\d+) flights", found.inner_text()).groups()))
+
+
+def test_a_campaign_outlives_the_browser_goes_on_after_a_stop_and_is_the_command_lines(browser, address, folder):
+    tab = Tab(browser, f"{address}#fly")
+    before = set(folder.glob("landing_campaign*"))
+    tab.page.get_by_role("button", name="Fly 200").click()
+    tab.page.locator("li.job.running").wait_for()
+    (campaign,) = until(lambda: {path for path in folder.glob("landing_campaign*") if path.is_dir()} - before)
+    tab.context.close()
+    until(lambda: list(campaign.rglob("*.parquet")))  # it flies on without anybody looking
+    back = Tab(browser, f"{address}#fly/{campaign.name}")
+    stop = back.page.locator("main").get_by_role("button", name="Stop")
+    go_on = back.page.locator("main").get_by_role("button", name="Go on")
+    stop.or_(go_on).or_(back.page.get_by_role("link", name="Open the campaign's page")).wait_for()
+    if stop.count():
+        stop.click()
+        go_on.wait_for()
+        flown, planned = flights_of(back)
+        assert 0 < flown <= planned == 200
+        go_on.click()
+    back.page.get_by_role("link", name="Open the campaign's page").wait_for()
+    assert flights_of(back) == (200, 200)
+    assert back.page.locator("main figure.picture svg").count() >= 1
+    back.close(address)
+    done = run("campaign", "landing", "--flights", 200, "--seed", 1, "--set", "wind.speed_20ft_m_s=4", "--set",
+               "wind.from_direction_deg=270", "--out", campaign.name, "--json", cwd=folder)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    facts = json.loads(done.stdout)
+    assert facts["flights"] == 200
+
+
+def test_a_small_requirement_is_flown_and_judged_to_its_certificate(browser, address, folder):
+    tab = Tab(browser, f"{address}#certify")
+    tab.page.get_by_label("Requirement").select_option("")
+    tab.page.get_by_label("Scenario").select_option("pad_return")
+    tab.page.get_by_label("at most").fill("5")
+    tab.page.get_by_label("with probability [%]").fill("80")
+    tab.page.get_by_label("shown with confidence [%]").fill("80")
+    tab.page.get_by_role("button", name="Fly and judge").click()
+    tab.page.get_by_role("link", name="Open the certificate").wait_for()
+    assert tab.page.inner_text("main p.big") == "pass"
+    place = tab.page.get_by_role("link", name="Open the certificate").get_attribute("href")
+    assert (folder / place.removeprefix("files/")).is_file()
+    tab.close(address)
+
+
+# -- who may ask ---------------------------------------------------------------------------------------------------
+class Quiet(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, *parts):
+        """Nothing."""
+
+
+@pytest.fixture
+def elsewhere(tmp_path):
+    """Another page, of another origin, on this machine."""
+    (tmp_path / "index.html").write_text("<!doctype html><title>elsewhere</title>")
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=tmp_path))
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    yield f"http://127.0.0.1:{server.server_port}/"
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
+def test_a_page_of_another_origin_reads_and_writes_nothing_even_with_the_token(browser, address, folder, elsewhere):
+    context = browser.new_context()
+    page = context.new_page()
+    page.goto(elsewhere)
+    asked = """async ([path, options]) => {
+      try {
+        const answer = await fetch(path, options);
+        return `${answer.type} ${answer.status}`;
+      } catch { return "refused"; }
+    }"""
+    assert page.evaluate(asked, [f"{address}api/state", {}]) == "refused"
+    assert page.evaluate(asked, [f"{address}api/upload?name=evil.ulg", {"method": "PUT", "body": "x"}]) == "refused"
+    blind = {"method": "POST", "mode": "no-cors", "body": '{"kind": "fly"}'}
+    assert page.evaluate(asked, [f"{address}api/jobs", blind]) in ("opaque 0", "refused")
+    framed = """(address) => new Promise((done) => {
+      const frame = document.createElement("iframe");
+      frame.onload = () => done(frame.contentDocument === null);
+      frame.src = address;
+      document.body.append(frame);
+    })"""
+    assert page.evaluate(framed, address)
+    context.close()
+    assert not (folder / "evil.ulg").exists()
+    assert not (folder / "landing.fnr").exists()
+
+
+def test_without_the_token_the_browser_is_told_what_to_open(browser, address):
+    context = browser.new_context()
+    page = context.new_page()
+    for wrong in (address.replace(TOKEN, "token-of-nobody"), address.replace(f"{TOKEN}/", "")):
+        answer = page.goto(wrong)
+        assert answer.status == 403
+        assert page.inner_text("body").strip() == (
+            "flownav: the token is missing; open the address that flownav app printed"
+        )
+    context.close()

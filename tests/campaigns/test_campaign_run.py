@@ -19,6 +19,7 @@ from command import run as typed
 from flownav.campaigns import run as running
 from flownav.campaigns.engines import Local, Part, neighbours
 from flownav.campaigns.local import fly_many
+from flownav.campaigns.measures import ROW_COLUMNS
 from flownav.campaigns.plan import planned
 from flownav.campaigns.run import record_again, run_campaign
 from flownav.campaigns.store import PART, Dataset, Store
@@ -209,7 +210,7 @@ def test_what_was_saved_and_is_damaged_is_told_of_and_flown_again(tmp_path, monk
     assert files_in(tmp_path / "5") == files_in(tmp_path / "whole")
 
 
-@pytest.mark.parametrize(("block_s", "saved"), [(0.1, 0), (4.0, 5), (60.0, 15)])
+@pytest.mark.parametrize(("block_s", "saved"), [(0.0, 1), (0.1, 2), (0.4, 5), (4.0, 15), (60.0, 15)])
 def test_a_part_is_saved_by_time_and_not_by_flights(tmp_path, monkeypatch, block_s, saved):
     """A clock on which each block of 16 flights takes so long: a part of 16 blocks, the last of which is the part."""
     now, written = [0.0], []
@@ -221,8 +222,45 @@ def test_a_part_is_saved_by_time_and_not_by_flights(tmp_path, monkeypatch, block
 
     flown_watched(tmp_path, plan_of(PART), watch)
     assert len(written) == saved
-    assert max(np.diff([0.0, *written, now[0]]), default=0.0) <= max(running.SAVE_S + block_s, 16 * 0.1)
-    assert running.SAVE_S <= 10.0
+    assert written[0] == block_s
+    assert max(np.diff([*written, now[0]])) <= running.SAVE_S + block_s
+
+
+class Stalling:
+    """An engine that, asked for the next piece, sees what the folder holds of those before, on a clock that has come
+    `each_s` further each time.
+    """
+
+    piece = 16
+
+    def __init__(self, now, each_s, held):
+        self.now, self.each_s, self.held = now, each_s, held
+
+    def fly(self, cell, seed, parts, on_progress):
+        for part in parts:
+            yield part, np.zeros((part.flights, len(ROW_COLUMNS)))
+            self.held()
+            self.now[0] += self.each_s
+
+
+LOST = [(0.0, [0, 16, 32]), (0.7, [0, 16, 0]), (1.0, [0, 0, 0]), (90.0, [0, 0, 0])]  # flights lost as each is awaited
+
+
+@pytest.mark.parametrize(("each_s", "lost"), LOST)
+def test_a_kill_while_the_next_piece_is_awaited_costs_what_came_within_a_second(tmp_path, monkeypatch, each_s, lost):
+    now, kept = [5.0], []
+    monkeypatch.setattr(running.time, "monotonic", lambda: now[0])
+    with Store(tmp_path).opened(plan_of(PART)) as store:
+
+        def held():
+            begun = store.begun(0, 0)
+            kept.append(0 if begun is None else len(begun.rows))
+            if len(kept) == len(lost):
+                raise Killed
+
+        with pytest.raises(Killed):
+            run_campaign(plan_of(PART), Stalling(now, each_s, held), store)
+    assert [16 * (k + 1) - had for k, had in enumerate(kept)] == lost
 
 
 # -- kills ------------------------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from flownav.core.text import finite, finite_or_none
+from flownav.core.text import finite, finite_or_none, harmless
 
 
 @pytest.mark.parametrize("value", [None, math.nan, math.inf, -math.inf, np.float64("nan")])
@@ -26,3 +26,8 @@ def test_all_within_a_value_can_be_said_and_what_is_no_number_stays():
     said = {"a": [1.5, None, [None, "text"]], "b": {"c": 3, "d": True, "e": None}}
     assert finite(told) == said
     assert json.loads(json.dumps(finite(told), allow_nan=False)) == said
+
+
+def test_what_would_command_a_terminal_is_written_as_an_escape():
+    assert harmless("pass\x1b[2J\x1b[1;1HHOLDS\r\x07\x9b\x7f") == r"pass\x1b[2J\x1b[1;1HHOLDS\r\x07\x9b\x7f"
+    assert harmless("5 µg/√Hz, café\t│\n") == "5 µg/√Hz, café\t│\n"

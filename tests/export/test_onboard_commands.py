@@ -117,6 +117,40 @@ def test_the_example_tells_of_a_processor_that_differs(built, tmp_path):
     assert "differs" in done.stdout.splitlines()[0]
 
 
+AT_REST = """
+#include <math.h>
+#include "own.c"
+int main(void) {
+  const double gyro[3] = {0.0, 0.0, 0.0}, accel[3] = {0.0, 0.0, -9.80665}, pos[3] = {10.0, 20.0, -1.0};
+  flownav_state state;
+  int i, said = 0;
+  start();
+  if (where(0.0, &state)) return 1;
+  for (i = 1; i <= 3000; ++i) {
+    said += on_imu(0.01 * i, gyro, accel) != FLOWNAV_TAKEN;
+    if (i % 20 == 0) said += on_gps(0.01 * i, pos) != FLOWNAV_TAKEN;
+    between();
+  }
+  if (said != 0 || !where(30.0, &state)) return 2;
+  return fabs(state.pos_ned_m[0] - pos[0]) < 0.5 && fabs(state.pos_ned_m[2] - pos[2]) < 0.5 && state.aid == 0.0 ? 0 : 3;
+}
+"""
+
+
+def test_the_readme_is_a_program_that_navigates(built, tmp_path):
+    """With nothing but the header, the library and the README: its source, called at rest under GPS."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no C compiler `cc` here: Debian's gcc")
+    (source,) = re.findall(r"```c\n(.*?)```", (built / "README.md").read_text(), re.DOTALL)
+    (tmp_path / "own.c").write_text(source)
+    (tmp_path / "rest.c").write_text(AT_REST)
+    strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", f"-I{built}"]
+    libraries = [built / "flownav_settings.c", built / "libflownav.a", "-lm"]
+    subprocess.run([compiler, *strict, tmp_path / "rest.c", *libraries, "-o", tmp_path / "rest"], check=True)
+    assert subprocess.run([tmp_path / "rest"], check=False).returncode == 0
+
+
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="no cmake here: Debian's cmake")
 def test_cmake_builds_the_example(built, tmp_path):
     made = tmp_path / "made"

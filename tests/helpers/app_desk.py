@@ -31,9 +31,16 @@ for line in sys.stdin:
     else: answer = {"explained": "nothing wrong", "asked": asked, "path": [[0, 0], [1, 2]]}
     print(json.dumps(answer), flush=True)
 """
-# a command that prints its words as its facts; `report slow.fnr` takes for ever
+# a command that prints its words as its facts; `report slow.fnr` takes for ever, a live session until it is to end
 COMMAND = """
-import json, sys, time
+import json, signal, sys, time
+if sys.argv[1] == "live":
+    ending = []
+    signal.signal(signal.SIGTERM, lambda number, frame: ending.append(number))
+    print("flownav: is at work", file=sys.stderr, flush=True)
+    while not ending: time.sleep(0.01)
+    print(json.dumps({"schema": 1, "sent": 7}), flush=True)
+    sys.exit(0)
 print("flownav: is at work", file=sys.stderr, flush=True)
 if any("slow" in word for word in sys.argv): time.sleep(600)
 if any("bad" in word for word in sys.argv): print("flownav: bad.fnr: is no record", file=sys.stderr); sys.exit(2)

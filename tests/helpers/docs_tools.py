@@ -10,6 +10,7 @@ TOOLS = PROJECT / "tools" / "docs"
 if str(TOOLS) not in sys.path:
     sys.path.insert(0, str(TOOLS))
 
+import app_pictures  # noqa: E402
 import cells  # noqa: E402
 import figures  # noqa: E402
 import figures_book  # noqa: E402
@@ -28,6 +29,7 @@ import reference_tables  # noqa: E402
 import units  # noqa: E402
 
 __all__ = [
+    "app_pictures",
     "cells", "figures", "figures_book", "figures_history", "figures_pages", "figures_table", "mathematics",
     "notebooks", "pictures", "readme_picture", "reference", "reference_api", "reference_commands", "reference_keys",
     "reference_tables", "units",

@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from flownav.report import path_picture as path_module
 from flownav.report import series
 from flownav.report.campaign_figures import Touchdowns
 from flownav.report.cloud_picture import cloud_picture
@@ -17,7 +18,7 @@ from flownav.report.landing import landing_picture
 from flownav.report.landing_scene import FRAMES
 from flownav.report.path_picture import path_picture
 from flownav.report.sureness import three_sigma
-from flownav.scoring.phases import NAMES
+from flownav.scoring.phases import NAMES, Phase
 from report_records import flight, navigated, replay
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -201,7 +202,7 @@ def test_the_first_lines_say_whether_it_landed_where_how_sure_and_what_limited_i
     touchdown = record.manifest["scores"]["touchdown"]
     touchdown |= {"limited_by": {"estimate_m": 0.1, "guidance_m": 0.34, "pad_m": 0.0}}
     said = headline(record)
-    assert said.startswith("It touched 0.370 m from the pad's centre.")
+    assert said.startswith("It landed: it touched 0.370 m from the pad's centre.")
     assert "within 0.090 m" in said  # three sigma of the less certain axis, east
     assert "The largest part of that distance is due to guidance (0.340 m)" in said
     assert said in render(record).replace("&#39;", "'")
@@ -243,6 +244,23 @@ def test_a_log_has_its_path_with_the_cut_of_gps_and_its_height_by_phase():
     for name in ("estimate", "gps_position", "autopilot", "truth", "smoothed"):
         record.tables.pop(name, None)
     assert path_picture(record) is None
+
+
+def test_the_dot_on_a_logs_path_flies_what_was_in_the_air_and_no_long_stand(monkeypatch):
+    record, seconds = replay(), {}
+    start, end = series.start_end_s(record)
+    air = [("ground", start, 30.0), ("climb", 30.0, 40.0), ("hover", 40.0, 50.0), ("landed", 50.0, end)]
+    for name, phases in (("flown", air), ("stood", [("ground", start, end)])):
+        monkeypatch.setattr(path_module, "phases_of", lambda _, made=phases: [Phase(*one) for one in made])
+        height = ElementTree.fromstring(path_picture(record).svg).findall(f"{SVG}svg")[1]
+        (moved,) = height.iter(f"{SVG}animateTransform")
+        x_px = floats(moved.get("values")).reshape(-1, 2)[:, 0]
+        left, right = 34.0, path_module.HEIGHT_PX - 8.0
+        seconds[name] = start + (x_px[[0, -1]] - left) / (right - left) * (end - start)
+    assert seconds["flown"] == pytest.approx([28.0, 52.0], abs=0.2)
+    assert seconds["stood"] == pytest.approx([start, end], abs=0.2)
+    words = path_picture(record).words
+    assert "The others are shifted so that they agree with it or with GPS on average." in words
 
 
 def test_a_campaigns_picture_has_every_touchdown_and_its_rings_to_scale():

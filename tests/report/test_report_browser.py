@@ -369,6 +369,40 @@ def test_words_beside_curves_are_whole_and_clear_of_each_other(
     visit.context.close()
 
 
+# Of every word that a canvas writes: the word, where it begins and ends, and how wide the canvas is [CSS px].
+WRITTEN = """window.written = [];
+const write = CanvasRenderingContext2D.prototype.fillText;
+CanvasRenderingContext2D.prototype.fillText = function (words, x, y) {
+  const wide = this.measureText(words).width;
+  const from = x - { left: 0, center: wide / 2, right: wide }[this.textAlign];
+  window.written.push([words, from, from + wide, this.canvas.width / devicePixelRatio]);
+  return write.call(this, words, x, y);
+};"""
+
+
+@pytest.mark.parametrize("width", [1440, 390])
+def test_heights_and_north_of_the_path_in_space_are_whole_however_it_is_turned(
+    browser: Any, pages: dict[str, Path], width: int
+) -> None:
+    visit = Visit(browser, pages["landing"], width=width, watch=WRITTEN)
+    path = visit.page.locator("[data-figure=path-3d] canvas")
+    for _ in range(16):  # half a turn
+        for _ in range(2):
+            path.press("ArrowRight")
+        visit.paint()
+    written = visit.page.evaluate("window.written")
+    assert {"N", "2 m"} <= {words for words, *_ in written}
+    assert [one for one in written if one[1] < 0.0 or one[2] > one[3]] == []
+    visit.context.close()
+
+
+def test_a_long_name_of_a_log_breaks_on_a_phone(browser: Any, pages: dict[str, Path]) -> None:
+    visit = Visit(browser, pages["replay"], width=390)
+    visit.page.evaluate("document.querySelector('h1').textContent = 'voxl_two_flow_sensors_and_more_of_it.ulg'")
+    assert visit.page.evaluate("document.documentElement.scrollWidth") <= 390
+    visit.context.close()
+
+
 def test_the_picture_stands_in_one_row_on_paper_and_tables_are_whole(browser: Any, pages: dict[str, Path]) -> None:
     visit = Visit(browser, pages["landing"], width=688)  # A4 less its margins
     views = "[...document.querySelectorAll('.landing-views svg')].map((view) => view.getBoundingClientRect().top)"

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from flownav.api.arguments import checked
 from flownav.core.errors import InputError
@@ -15,6 +15,7 @@ from flownav.core.guard import inputs_there
 
 if TYPE_CHECKING:
     from flownav.api.sensor import Sensor
+    from flownav.lab.identification.vehicle_parameters import Identified
 
 
 @checked
@@ -86,3 +87,16 @@ def identify_logs(
         findings = replace(findings, datasheet=base_sensor)
     entries = sensor_entries(findings, base_sensor, f"identified from {name_of(logs)}", command_line())
     return Sensor(entries, None, findings)
+
+
+def identify_vehicle_log(log: Path, base: Path | None) -> tuple[Identified, dict[str, Any]]:
+    """Parameters that a log shows of its vehicle, and the vehicle file's content. InputError where it shows nothing."""
+    from flownav.lab.identification.commanded import HELICOPTER, read_commanded
+    from flownav.lab.identification.vehicle_file import vehicle_entries
+    from flownav.lab.identification.vehicle_parameters import identify_vehicle
+    from flownav.vehicle.kinds import load_vehicle
+
+    flight = read_commanded(log)
+    file = base or Path("maxi-joker-3" if flight.kind == HELICOPTER else "quad-450")
+    found = identify_vehicle(flight, load_vehicle(file))
+    return found, vehicle_entries(found, file, f"identified from {log.name}")

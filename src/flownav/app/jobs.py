@@ -1,13 +1,13 @@
 """Jobs: commands of flownav as child processes, two at a time, each of which can be cancelled."""
 
 import asyncio
+import contextlib
 import json
 import os
 import signal
 import sys
 import time
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Coroutine, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,8 @@ from flownav.app.tasks import Task, command_line
 COMMAND = (sys.executable, "-m", "flownav")
 AT_ONCE = 2
 GRACE_S = 3.0  # between asking a command to end and ending it
+LIVE = "live"  # a session: it waits for nobody, and asked to end it still makes its record
+RECORD_S = 120.0  # that it has for that
 MOST_JOBS = 200  # that the page remembers
 LONGEST_LINE = 1 << 26  # bytes of a command's one JSON object
 QUEUED, RUNNING, DONE, FAILED, CANCELLED = "queued", "running", "done", "failed", "cancelled"
@@ -36,6 +38,7 @@ class Job:
     since_s: float = field(default_factory=time.time)
     ended_s: float | None = None
     process: asyncio.subprocess.Process | None = None
+    ending: bool = False  # a session was asked to end
 
     def shown(self) -> dict[str, Any]:
         """The job as the page has it."""
@@ -43,6 +46,7 @@ class Job:
             "number": self.number, "kind": self.kind, "state": self.state, "message": self.message,
             "facts": self.facts, "about": self.task.about, "writes": self.task.writes,
             "command": command_line(self.task.words), "since_s": self.since_s, "ended_s": self.ended_s,
+            "ending": self.ending,
         }  # fmt: skip
 
 
@@ -56,20 +60,32 @@ class Jobs:
         self._running: set[asyncio.Task[None]] = set()
 
     def start(self, kind: str, task: Task) -> Job:
-        """Begin a job, which waits while two others run."""
+        """Begin a job, which waits while two others run, but for a live session."""
         job = Job(max(self.all, default=0) + 1, kind, task)
         self.all[job.number] = job
         for number in [each.number for each in self.all.values() if each.ended_s][: max(0, len(self.all) - MOST_JOBS)]:
             del self.all[number]
-        running = asyncio.get_running_loop().create_task(self._run(job))
-        self._running.add(running)
-        running.add_done_callback(self._running.discard)
+        self._keep(self._run(job))
         return job
 
+    def _keep(self, doing: Coroutine[Any, Any, None]) -> None:
+        """Do it while other requests are answered."""
+        task = asyncio.get_running_loop().create_task(doing)
+        self._running.add(task)
+        task.add_done_callback(self._running.discard)
+
     async def cancel(self, number: int) -> None:
-        """End a job; what it has not written whole is gone, what a campaign has flown stays."""
+        """End a job; what it has not written whole is gone, what a campaign has flown stays.
+
+        A live session is asked to end, and makes its record.
+        """
         job = self.all.get(number)
         if job is None or job.ended_s is not None:
+            return
+        if job.kind == LIVE and job.process is not None:
+            if not job.ending:
+                job.ending = True
+                self._keep(ended(job.process, RECORD_S))
             return
         job.state = CANCELLED
         if job.process is not None:
@@ -83,7 +99,7 @@ class Jobs:
 
     async def _run(self, job: Job) -> None:
         try:
-            async with self._slots:
+            async with contextlib.nullcontext() if job.kind == LIVE else self._slots:
                 if job.state == QUEUED:
                     job.state = RUNNING
                     await self._fly(job)
@@ -103,10 +119,10 @@ class Jobs:
         assert job.process.stdout is not None
         _, printed = await asyncio.gather(_follow(job, job.process.stderr), job.process.stdout.read())
         status = await job.process.wait()
-        if job.state == CANCELLED:
-            job.message = "cancelled"
+        job.facts = None if job.state == CANCELLED else _facts(printed)
+        if job.state == CANCELLED or (job.ending and job.facts is None):
+            job.state, job.message = CANCELLED, job.message if job.ending else "cancelled"
             return
-        job.facts = _facts(printed)
         job.state = DONE if job.facts is not None and status in (0, BAD_VERDICT) else FAILED
         if job.state == FAILED and not job.message:
             job.message = f"the command ended with status {status}"
@@ -129,12 +145,12 @@ def _facts(printed: bytes) -> dict[str, Any] | None:
     return found if isinstance(found, dict) else None
 
 
-async def ended(process: asyncio.subprocess.Process) -> None:
+async def ended(process: asyncio.subprocess.Process, grace_s: float = GRACE_S) -> None:
     """End a process and its children: asked first, and made to after a grace."""
-    for how, wait_s in ((signal.SIGTERM, GRACE_S), (signal.SIGKILL, 60.0)):
+    for how, wait_s in ((signal.SIGTERM, grace_s), (signal.SIGKILL, 60.0)):
         if process.returncode is not None:
             return
-        with suppress(ProcessLookupError):
+        with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, how)
         try:
             await asyncio.wait_for(process.wait(), wait_s)

@@ -12,6 +12,7 @@ from flownav.app import uploads
 from flownav.app.desk import Desk
 from flownav.app.doors import NAMES, WRITTEN_POLICY, Doors
 from flownav.app.requirements import kept_requirement
+from flownav.app.sessions import sessions_in
 from flownav.app.shelf import Shelf
 from flownav.app.tasks import command_line, flight_words, task_of
 from flownav.core.errors import InputError, arg
@@ -49,6 +50,7 @@ def application(desk: Desk) -> Any:
         Route("/static/{name}", _static),
         Route("/files/{name:path}", _of(desk, _file)),
         Route("/api/state", _of(desk, _state)),
+        Route("/api/live", _of(desk, _live)),
         Route("/api/upload", _of(desk, _upload), methods=["PUT"]),
         Route("/api/folder", _of(desk, _folder), methods=["POST"]),
         Route("/api/remove", _of(desk, _remove), methods=["POST"]),
@@ -185,6 +187,10 @@ async def _file(desk: Desk, request: "Request") -> "Response":
 
 async def _state(desk: Desk, request: "Request") -> "Response":
     return _json(desk.state())
+
+
+async def _live(desk: Desk, request: "Request") -> "Response":
+    return _json({"sessions": sessions_in(desk.shelf.folder, desk.jobs.all)})
 
 
 async def _upload(desk: Desk, request: "Request") -> "Response":

@@ -3,6 +3,7 @@
 A name that is taken is numbered by the command, which says in its facts where the file lies.
 """
 
+import itertools
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -13,6 +14,9 @@ from flownav.core.errors import InputError
 
 NUMBER = re.compile(r"-?\d+(\.\d+)?")
 WORD = re.compile(r"[A-Za-z0-9_.+-]+")
+LINK = re.compile(r"(udp|udpin|udpout|tcp|tcpin|serial):[^\s'\"]{1,200}")
+SENDINGS = ("none", "odometry", "vision", "landing-target")
+STATUS = ".live.json"  # of the files that hold the state of a live session
 AUTOPILOTS = ("px4", "ardupilot", "inav")
 SEED = (0, 2**63 - 1)
 
@@ -115,6 +119,39 @@ def _certify(asked: Asked, shelf: Shelf) -> Task:
     return Task((*words, "--out", out), (), out)
 
 
+def _live(asked: Asked, shelf: Shelf) -> Task:
+    """A live session: its record, and the file with its state that the page reads while it runs."""
+    url, send = str(asked.get("url", "")), asked.get("send", "none")
+    if not LINK.fullmatch(url):
+        raise InputError(f"{url[:40]!r}: is no link; give one such as udp:14550 or serial:/dev/ttyACM0:115200")
+    if send not in SENDINGS:
+        raise InputError(f"{str(send)[:40]!r}: {', '.join(SENDINGS)} are possible")
+    words = ["live", url, "--send", send]
+    words += ["--sensor", word(asked["sensor"])] if asked.get("sensor") else []
+    for name, least, most in (
+        ("gps_delay", 0.0, 1.0), ("send_limit", 0.1, 60.0), ("send_sigma", 0.01, 1e3), ("send_protection", 0.01, 1e3),
+    ):  # fmt: skip
+        words += [f"--{name.replace('_', '-')}", number(asked[name], least, most)] if asked.get(name) else []
+    name = _flight_name(shelf)
+    return Task((*words, "--record", f"{name}.fnr", "--status", f"{name}{STATUS}"), (), f"{name}.fnr")
+
+
+def _flight_name(shelf: Shelf) -> str:
+    """A name that no record, no journal of a session and no state of one has."""
+    for count in itertools.count():
+        name = f"flight-{count}" if count else "flight"
+        if not any(shelf.path_of(f"{name}{ending}").exists() for ending in (".fnr", ".fnr.journal", STATUS)):
+            return name
+    raise AssertionError
+
+
+def _vehicle(asked: Asked, shelf: Shelf) -> Task:
+    """A simulated vehicle for a live session that listens at a port of this machine."""
+    port = number(asked.get("port", 14550), 1, 65535, whole=True)
+    out = "simulated.fnr"
+    return Task(("fly", "pad_return", "--mavlink", f"udpout:127.0.0.1:{port}", "--no-report", "--out", out), (), out)
+
+
 TASKS: dict[str, Callable[[Asked, Shelf], Task]] = {
     "replay": _replay,
     "report": _report,
@@ -124,6 +161,8 @@ TASKS: dict[str, Callable[[Asked, Shelf], Task]] = {
     "fly": _fly,
     "campaign": _campaign,
     "certify": _certify,
+    "live": _live,
+    "vehicle": _vehicle,
 }
 
 

@@ -1,6 +1,7 @@
 """A campaign flown, cell by cell, until all flights are there or are enough; and one flight of it again."""
 
 import ctypes
+import math
 import os
 import sys
 import time
@@ -31,7 +32,7 @@ ENGINES = ("local", "ray", "cuda")
 LANDING, TAKEOFF = "r95_m", "p95_axis_m"  # what is followed while a campaign flies
 # parameters of glibc's mallopt (malloc.h)
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8
-SAVE_S = 10.0  # with the piece that is being flown then, no more than 20 s of flights are lost to a kill
+SAVE_S = 1.0  # pieces that arrive in less than this after a save wait for the next one
 LARGE_BYTES = 1 << 20  # a piece of this size is asked of the system, and goes back to it when it is free
 
 
@@ -160,13 +161,14 @@ def _parts_until(
 def _flown(
     plan: Plan, cell: int, missing: list[Part], ready: Ready, engine: Engine, store: Store, link: Link, done: Counted
 ) -> Iterator[tuple[Part, Array]]:
-    """The parts that are missing, flown in pieces; what has flown of a part is saved every SAVE_S.
+    """The parts that are missing, flown in pieces, which are saved as they arrive: the first one at once, and then no
+    more often than every SAVE_S. The next piece may be long in coming, so that none waits for one.
 
-    The first goes on behind the flights that were saved of it.
+    The first part goes on behind the flights that were saved of it.
     """
     begun = _begun(store, cell, missing[0], link.digest, done)
     done.found(len(begun))
-    rows, have, saved_s = [begun], len(begun), time.monotonic()
+    rows, have, saved_s = [begun], len(begun), -math.inf
     waiting = deque(missing)
     for piece, more in engine.fly(ready, plan.seed, list(_pieces(missing, have, engine.piece)), done.flown):
         part = waiting[0]

@@ -12,6 +12,7 @@ import typer
 from flownav.core.compiling.progress import announce_compilation
 from flownav.core.errors import FlownavError, InputError
 from flownav.core.guard import a_run
+from flownav.core.text import harmless
 from flownav.core.version import __version__
 
 DONE, BAD_VERDICT, BAD_INPUT, BROKEN_OFF = 0, 1, 2, 130  # the last of Ctrl-C, as shells have it
@@ -157,5 +158,5 @@ def _leave_usage(error: typer.TyperException) -> None:
 
 
 def _leave(message: str, status: int) -> None:
-    print(f"flownav: {message}", file=sys.stderr)
+    print(f"flownav: {harmless(message)}", file=sys.stderr)
     sys.exit(status)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flownav.cli import options
-from flownav.cli.options import chosen, named, numbers, option, out_option
+from flownav.cli.options import chosen, named, numbers, option, out_option, switch
 from flownav.cli.output import Column, answer, by_reason, place, say, say_files, table, table_of
 from flownav.core.errors import InputError
 from flownav.core.text import number
@@ -23,7 +23,8 @@ ORDER = "The model's order; delay is gain and latency alone."
 HEIGHTS = "Sensor's height [m], one for all logs or one each; repeated or with commas."
 REFERENCE = "The reference: of a rig, of a flight."
 FOR = "Also write this autopilot's parameters."
-BASE = "The sensor file for what no log shows (optics, limits)."
+BASE = "The sensor file, or with --vehicle the vehicle file, for what no log shows."
+VEHICLE = "Identify the vehicle instead, of one flight's log with commands; writes a vehicle file."
 RESPONSES = (
     Column("axis", lambda r: r.axis),
     Column("height [m]", lambda r: f"{r.height_m:.2f}"),
@@ -50,8 +51,9 @@ def command(
     reference: Annotated[str, chosen(REFERENCE, *options.REFERENCES)] = "auto",
     flow_instance: options.FlowInstance = None,
     autopilot: Annotated[str | None, chosen(FOR, *options.SCALED_FLOW, flag="--for")] = None,
-    base: Annotated[Path | None, option("FILE.toml", BASE, unset="the paper's sensor")] = None,
-    out: Annotated[Path | None, out_option("The sensor file (TOML)", "out/LOG.toml")] = None,
+    base: Annotated[Path | None, option("FILE.toml", BASE, unset="the paper's sensor, a shipped vehicle")] = None,
+    vehicle: Annotated[bool, switch(VEHICLE, "--vehicle")] = False,
+    out: Annotated[Path | None, out_option("The sensor or vehicle file (TOML)", "out/LOG.toml")] = None,
     force: options.Force = False,
     as_json: options.Json = False,
 ) -> None:
@@ -59,6 +61,11 @@ def command(
     from flownav.api.identifying import require_logs
 
     require_logs(logs)
+    if vehicle:
+        given = {"--order": order != "auto", "--heights": bool(heights), "--reference": reference != "auto",
+                 "--flow-instance": flow_instance is not None, "--for": autopilot is not None}  # fmt: skip
+        identify_vehicle(logs, base, out, [name for name, is_given in given.items() if is_given], force, as_json)
+        return
 
     from flownav.api.identifying import identify_logs
     from flownav.lab.identification.autopilot_parameters import left_out, parameters
@@ -79,12 +86,76 @@ def command(
         answer(facts, as_json, lambda: show(findings, facts))
 
 
-def _sensor_path(out: Path | None, logs: list[Path]) -> Path:
+VEHICLE_COLUMNS = (
+    Column("parameter", lambda f: f.name),
+    Column("value [95 % interval]", lambda f: _figures(f.interval)),
+    Column("unit", lambda f: f.unit),
+)
+
+
+def identify_vehicle(
+    logs: list[Path], base: Path | None, out: Path | None, sensors_own: list[str], force: bool, as_json: bool
+) -> None:
+    """Identify the vehicle of one flight, print what it shows with intervals, and write the vehicle file."""
+    from flownav.api.identifying import identify_vehicle_log
+    from flownav.lab.identification.vehicle_file import moved_entries, write_vehicle
+
+    if sensors_own:
+        raise InputError(f"{sensors_own[0]} is of a flow sensor; leave it out with --vehicle")
+    if len(logs) != 1:
+        raise InputError("--vehicle takes one flight's log")
+    path = place(_sensor_path(out, logs, "-vehicle"), *logs, base, force=force)
+    found, contents = identify_vehicle_log(logs[0], base)
+    flight = found.flight
+    moved = [entry.key for entry in moved_entries(found, base_of(base, flight.kind))]
+    if moved:
+        write_vehicle(path, contents)
+    shown = [each for each in found.found if each.interval is not None]
+    facts = {
+        "kind": flight.kind, "log": str(logs[0]), "commands": flight.command_name, "setpoint": flight.setpoint_name,
+        "seconds": flight.span_s, "highest_hz": flight.highest_hz,
+        "parameters": [
+            {"key": f.key, "unit": f.unit, **_numbers(f.interval), "why_none": f.why or None}
+            for f in found.found
+        ],
+        "entries": moved, "notes": list(found.notes),
+        "vehicle": str(path) if moved else None,
+    }  # fmt: skip
+    lacking = list(by_reason((f.name, f.why) for f in found.found if f.interval is None))
+
+    def show() -> None:
+        title = f"{flight.kind}, {flight.span_s:.0f} s in the air, commands: {flight.command_name}"
+        say(
+            table_of(VEHICLE_COLUMNS, shown, title=title),
+            *(f"No number: {names}; {why}" for names, why in lacking),
+            *(f"Note: {note}" for note in found.notes),
+            f"Moved in the file: {', '.join(moved)}" if moved else "No vehicle file: nothing found moves an entry",
+        )
+        say_files(facts, ("vehicle",))
+
+    answer(facts, as_json, show)
+
+
+def base_of(base: Path | None, kind: str) -> Path:
+    """The vehicle file for what no log shows."""
+    return base or Path("maxi-joker-3" if kind == "helicopter" else "quad-450")
+
+
+def _numbers(interval: Any) -> dict[str, float | None]:
+    return dict(zip(("value", "low", "high"), interval or (None,) * 3, strict=True))
+
+
+def _figures(interval: Any) -> str:
+    value, low, high = (f"{number:.3g}" for number in interval)
+    return f"{value} [{low}, {high}]"
+
+
+def _sensor_path(out: Path | None, logs: list[Path], ending: str = "") -> Path:
     from flownav.lab.identification.job import name_of
 
-    path = out or Path("out") / f"{name_of(logs)}.toml"
+    path = out or Path("out") / f"{name_of(logs)}{ending}.toml"
     if path.suffix != ".toml":
-        raise InputError(f"--out {path}: a sensor file's name ends in .toml")
+        raise InputError(f"--out {path}: a {'vehicle' if ending else 'sensor'} file's name ends in .toml")
     return path
 
 

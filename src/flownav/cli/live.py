@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from flownav.cli import live_help, options
 from flownav.cli.options import chosen, named, one_of, option, switch
-from flownav.cli.output import answer, require_between, require_recordable, say, say_files
+from flownav.cli.output import answer, require_between, require_place, require_recordable, say, say_files
 from flownav.core.errors import InputError, VerdictError
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ SIGMA = "Send while one standard deviation of the position is below this [m]."
 PROTECTION = "Send while the horizontal protection level is below this [m]."
 UNFUSED = "Send nothing once a horizontal sensor is received but not fused for this long [s]."
 ACCEPT = "Who else may send a message, 0 for any; may be repeated."
+STATUS = "A JSON file with the session's state, replaced twice a second and removed at the end."
 DURATION = "End after this time."
 CARRIES = "The link's capacity each way."
 BAUD = "a serial port's by its baud rate"
@@ -42,6 +43,7 @@ ORIGIN = "With --setup: where the EKF's frame begins, for a vehicle without GPS 
 SOURCES = "With --setup: ArduPilot's source set for flownav."
 Url = Annotated[str, named("URL", URL, autocompletion=one_of(*options.LINKS)["autocompletion"])]
 Record = Annotated[Path | None, option("PATH", RECORD, "--out", "--record", unset="none is written")]
+Status = Annotated[Path | None, option("PATH", STATUS, unset="none is written")]
 System = Annotated[int | None, option("N", SYSTEM, unset="the first autopilot's", within=NUMBERS)]
 Component = Annotated[int | None, option("N", COMPONENT, unset="the autopilot's", within=NUMBERS)]
 Accept = Annotated[list[str] | None, option("MESSAGE=SYSTEM.COMPONENT", ACCEPT)]
@@ -68,6 +70,7 @@ def command(
     send_protection: Annotated[float, option("M", PROTECTION, within=(0.01, 1000.0))] = 20.0,
     unfused: Annotated[float, option("S", UNFUSED, within=(1.0, float("inf")))] = 5.0,
     accept: Accept = None,
+    status: Status = None,
     duration: Duration = None,
     capacity: Capacity = None,
     setup: Annotated[bool, switch(SETUP, "--setup")] = False,
@@ -81,11 +84,12 @@ def command(
     from flownav.live.link import parse_url
     from flownav.live.options import Limits
     from flownav.live.reception import accepted_by
+    from flownav.live.status import status_place
     from flownav.logs.mavlink.signing import load_key
 
     require_between("--gps-delay", gps_delay, 0.0, 1.0)
-    if setup and record is not None:
-        raise InputError("--out: --setup flies nothing; leave one of the two away")
+    if setup and (record is not None or status is not None):
+        raise InputError(f"{'--out' if record else '--status'}: --setup flies nothing; leave one of the two away")
     if setup:
         key = load_key(signing_key) if signing_key else None
         return run_setup(
@@ -96,18 +100,22 @@ def command(
         raise InputError("--write, --source-set and --origin go with --setup only")
     if record is not None:
         require_recordable(record, sensor, signing_key, settings, force=force)
+    if status is not None:
+        status = status_place(status)
+        require_place(status)
     given = replace(
         _options(send, system, component, signing_key, gps_delay, sensor, settings),
         limits=Limits(dead_reckoning_s=send_limit, sigma_m=send_sigma, protection_m=send_protection, unfused_s=unfused),
         accept=accepted_by(accept or []),
         capacity_bytes_s=capacity or parse_url(url).capacity_bytes_s,
     )
-    _navigate(url, given, record, duration, force=force, as_json=as_json)
+    _navigate(url, given, record, status, duration, force=force, as_json=as_json)
 
 
 def _navigate(
-    url: str, options: Options, record: Path | None, duration_s: float | None, *, force: bool, as_json: bool
-) -> None:
+    url: str, options: Options, record: Path | None, status: Path | None, duration_s: float | None, *, force: bool,
+    as_json: bool,
+) -> None:  # fmt: skip
     """Run until stopped; print the summary. VerdictError where no vehicle was received or no record was kept."""
     from flownav.live.byte_links import open_link
     from flownav.live.display import on_terminal
@@ -116,6 +124,7 @@ def _navigate(
     from flownav.live.recorder import facts_every_second
     from flownav.live.screen import Screen, traffic_facts
     from flownav.live.session import Session
+    from flownav.live.status import Status
 
     warm_up()
     shown = not as_json and sys.stdout.isatty()
@@ -131,9 +140,13 @@ def _navigate(
             own = _facts(session, latency, lasted_s) | {"traffic": traffic_facts(link, session, lasted_s)}
             return own | {"link": dict(link.counts), "scheduling": scheduling}
 
+        def screen() -> Screen:
+            return Screen(session, latency, url, recorder, scheduling, link)
+
         with stoppable() as asked:
-            with on_terminal(Screen(session, latency, url, recorder, scheduling, link).view, shown=shown) as display:
-                shows = [display.show, *([facts_every_second(recorder, facts_now)] if recorder is not None else [])]
+            state = Status(session, screen(), url, recorder.path if recorder else None, now_s)
+            with on_terminal(screen().view, shown=shown) as display, _status_file(status, state.look) as shows:
+                shows += [display.show, *([facts_every_second(recorder, facts_now)] if recorder is not None else [])]
                 run_session(session, link, latency, lambda: asked() or time.monotonic() >= end_s, shows)
             run_as_others()
             facts = facts_now()
@@ -176,6 +189,23 @@ def _recording(url: str, path: Path | None, options: Options, *, force: bool, sh
         if isinstance(error, KeyboardInterrupt):
             raise VerdictError(f"{url}: broken off") from error
         raise
+
+
+@contextmanager
+def _status_file(path: Path | None, look: Callable[[float], dict[str, Any]]) -> Iterator[list[Callable[[float], None]]]:
+    """The functions that the loop calls to have the status written; none where none is asked for."""
+    from flownav.live.status import StatusFile
+
+    if path is None:
+        yield []
+        return
+
+    def failed(reason: str) -> None:
+        with suppress(OSError):
+            print(f"flownav: {path}: cannot be written ({reason}); the session goes on", file=sys.stderr, flush=True)
+
+    with closing(StatusFile(path, look, failed)) as file:
+        yield [file.show]
 
 
 def _options(

@@ -7,7 +7,7 @@ GROUPS = {
     "The link": ("system", "component", "accept", "capacity", "signing_key"),
     "Messages sent, and the sensors": ("send", "sensor", "gps_delay", "settings"),
     "Limits, beyond which nothing is sent": ("send_limit", "send_sigma", "send_protection", "unfused"),
-    "The record": ("record", "force"),
+    "The record, and the state for others to read": ("record", "force", "status"),
     "Setting the vehicle up, in place of navigating": ("setup", "write", "source_set", "origin"),
 }
 EXAMPLES = (

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import typer
 
 from flownav.core.errors import InputError
-from flownav.core.text import interval_words
+from flownav.core.text import harmless, interval_words
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -74,7 +74,7 @@ def place(path: Path, *inputs: str | Path | None, force: bool, beside: Sequence[
     from flownav.core.free_names import a_place
 
     found = a_place(path, _read(inputs), force=force, beside=beside)
-    _require_place(path)
+    require_place(path)
     return named_place(path, found)
 
 
@@ -90,7 +90,7 @@ def several_place(path: Path, *inputs: str | Path | None, force: bool) -> Path:
     from flownav.core.free_names import a_place_of_several
 
     found = a_place_of_several(path, _read(inputs), force=force)
-    _require_place(path)
+    require_place(path)
     return named_place(path, found)
 
 
@@ -103,7 +103,7 @@ def folder_place(path: Path, *inputs: str | Path | None, force: bool | None = No
 
     _read(inputs)
     found = a_folder_place(path, force=bool(force))
-    _require_place(path)
+    require_place(path)
     return named_place(path, found, replaces=force is not None)
 
 
@@ -126,10 +126,10 @@ def require_recordable(path: Path, *inputs: str | Path | None, force: bool) -> N
     from flownav.core.guard import a_record_place
 
     a_record_place(path, _read(inputs), force=force)
-    _require_place(path)
+    require_place(path)
 
 
-def _require_place(path: Path) -> None:
+def require_place(path: Path) -> None:
     """InputError where no file can be made in the folder that a path lies in, or in the nearest that is there."""
     there = next((parent for parent in path.absolute().parents if parent.exists()), path.absolute().parent)
     with writing(path), TemporaryFile(dir=there):
@@ -209,7 +209,7 @@ def table(
     for k, head in enumerate(heads):
         made.add_column(head, justify="left" if left is None or k < left else "right", no_wrap=k < fixed)
     for row in rows:
-        made.add_row(*row)
+        made.add_row(*map(harmless, row))
     return made
 
 
@@ -240,7 +240,7 @@ def say(*things: Any, wide: int = 0, soft: bool = False) -> None:
         console.width = max(console.width, wide)
     for thing in things:
         for part in fitted(thing, console) if isinstance(thing, Table) and known else (thing,):
-            console.print(part, soft_wrap=soft)
+            console.print(harmless(part) if isinstance(part, str) else part, soft_wrap=soft)
 
 
 LEAST_WORDS = 20  # columns that a column of words is not made narrower than

@@ -25,6 +25,7 @@ import numpy as np
 
 from flownav.control.learnt_model import Line, NominalModel, Servo, answered, residual_of
 from flownav.core.compile import Lanes, Work, equation, exp, procedure, replacing
+from flownav.core.measurement import Array
 
 EPOCH_S = 0.02
 STIR_S, STIR_EPOCHS = 4.0, 200  # every line has whole periods in it
@@ -67,8 +68,14 @@ AGAIN_EPOCHS = 100  # after which a stir that was broken off begins anew
 LONGEST_EPOCHS = 3000  # after which it is given up: a landing waits for it no longer
 LOWEST_M = 1.0  # of the skids over a ground that is known: no stir below
 PRIOR = (0.45, 0.45, 0.25, 0.25, 0.07)  # standard deviations of the unknown: wider than the box of the shipped sheet
-# of a line's residuals: gusts leave the more the slower they are (their spectrum falls as 1/w²)
-WEIGHTS = np.clip(OMEGA_RAD_S / 12.0, 0.4, 1.2)
+
+
+def line_weights(w_rad_s: Array) -> Array:
+    """Weights of lines' residuals (n,): gusts leave the more the slower they are (their spectrum falls as 1/w²)."""
+    return np.clip(w_rad_s / 12.0, 0.4, 1.2)
+
+
+WEIGHTS = line_weights(OMEGA_RAD_S)
 FIRST_RESIDUAL_RAD = 3e-5  # standard deviation of a residual before any is known: a gust's of 4 m/s
 STEEPEST = 0.26  # sine of the tilt beyond the commanded one at which the stir is broken off: 15 degrees
 

@@ -70,9 +70,9 @@ def marked_table(text: str) -> bytes:
     return f"{names},{LINE}{hashlib.sha256(rest.encode()).hexdigest()}\n{rest}".encode()
 
 
-def marked_json(entries: dict[str, Any]) -> bytes:
-    """A JSON object as a file's bytes, with the mark as its first key."""
-    return (json.dumps({KEY: _digest(entries)} | entries, indent=1) + "\n").encode()
+def marked_json(entries: dict[str, Any], indent: int | None = 1) -> bytes:
+    """A JSON object as a file's bytes, with the mark as its first key. indent: None for one line."""
+    return (json.dumps({KEY: _digest(entries)} | entries, indent=indent) + "\n").encode()
 
 
 def _digest(entries: dict[str, Any]) -> str:

@@ -1,10 +1,13 @@
 """Numbers, names and nested dictionaries as text; the TOML is read back by `parameter_files`."""
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from decimal import Decimal
 from numbers import Integral
 from typing import Any
+
+CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")  # all but tab and line feed
 
 
 def number(text: str) -> float:
@@ -81,6 +84,13 @@ def exactly(value: float, times: int = 1) -> str:
     """A finite number, or a multiple of it, in as many decimals as it takes to tell it from every other."""
     shown = Decimal(repr(float(value))) * times
     return f"{shown.normalize() if shown else Decimal(0):f}"
+
+
+def harmless(text: str) -> str:
+    """Text for a terminal: characters that would command it, as a file from elsewhere can hold, are written as
+    escapes.
+    """
+    return CONTROL.sub(lambda found: repr(found.group())[1:-1], text)
 
 
 def plain(text: str) -> str:

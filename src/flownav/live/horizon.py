@@ -105,6 +105,7 @@ class Lags:
         self._most_s = most_s
         self._newest_s = float("-inf")
         self._windows: dict[Sensor, deque[tuple[float, float]]] = {}  # begin, greatest lag [s]
+        self._greatest: dict[Sensor, tuple[float, float]] = {}  # begin of the last window, greatest lag of all [s]
 
     def received(self, sensor: Sensor, instant_s: float) -> None:
         """A reading that describes an instant."""
@@ -117,11 +118,15 @@ class Lags:
             windows.append((self._newest_s, lag_s))
         elif lag_s > windows[-1][1]:
             windows[-1] = windows[-1][0], lag_s
+        else:
+            return
+        self._greatest[sensor] = windows[-1][0], max(lag_s for _, lag_s in windows)
 
     def clear(self) -> None:
         """Begin anew."""
         self._newest_s = float("-inf")
         self._windows.clear()
+        self._greatest.clear()
 
     @property
     def newest_s(self) -> float:
@@ -132,11 +137,7 @@ class Lags:
     def by_sensor(self) -> dict[Sensor, float]:
         """The lag to wait for, by sensor [s]; a sensor that has not spoken for all windows is not waited for."""
         oldest_s = self._newest_s - PATIENT_WINDOWS * WINDOW_S
-        return {
-            sensor: max(lag_s for _, lag_s in windows)
-            for sensor, windows in self._windows.items()
-            if windows[-1][0] >= oldest_s
-        }
+        return {sensor: lag_s for sensor, (since_s, lag_s) in self._greatest.items() if since_s >= oldest_s}
 
     def horizon_s(self, least_s: float, margin_s: float, most_s: float) -> float:
         """The time to wait [s]: the greatest lag and a margin, at least `least_s` and at most `most_s`."""

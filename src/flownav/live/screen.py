@@ -187,12 +187,11 @@ class Screen:
 
     def _protection(self) -> str:
         """How far off the position may be, and which fault is suspected."""
-        on = self._session.filtering.running
-        if on is None or not math.isfinite(on.work[PROTECTION]):
+        found = protection_of(self._session)
+        if found is None:
             return "protection levels: none yet"
-        suspected = int(on.work[SUSPECTED])
-        doubt = f"; suspected: {NAMES[suspected - 1]}" if suspected else ""
-        horizontal_m, vertical_m = (float(level_m) for level_m in on.work[PROTECTION : PROTECTION + 2])
+        horizontal_m, vertical_m, suspected = found
+        doubt = f"; suspected: {suspected}" if suspected else ""
         return f"protection levels: {horizontal_m:.2f} m horizontal, {vertical_m:.2f} m vertical{doubt}"
 
     def _footing(self) -> str:
@@ -218,6 +217,18 @@ class Screen:
             for place in places if reading else ():
                 values = self._strips.setdefault(COLUMNS[sensor][place], deque(maxlen=STRIP))
                 values.append(reading.value[place] if reading else float("nan"))
+
+
+def protection_of(session: Session) -> tuple[float, float, str] | None:
+    """Horizontal and vertical protection level [m], and the fault that is suspected ("" where none is); None before
+    there are any.
+    """
+    on = session.filtering.running
+    if on is None or not math.isfinite(on.work[PROTECTION]):
+        return None
+    suspected = int(on.work[SUSPECTED])
+    horizontal_m, vertical_m = (float(level_m) for level_m in on.work[PROTECTION : PROTECTION + 2])
+    return horizontal_m, vertical_m, NAMES[suspected - 1] if suspected else ""
 
 
 def is_shown(session: Session, key: tuple[int, int]) -> bool:

@@ -53,7 +53,7 @@ def open_log(path: Path, *, flow_instance: int | None = None, topics: Mapping[st
     if witness := upside_down(log.truth, log.streams):
         note = f"{log.truth_name} is left out: its down points up, as {witness} shows; give it with z downwards"
         return replace(log, truth=None, heading_truth=None, notes=(*log.notes, note))
-    truth, notes = examined(log.truth, log.truth_name)
+    truth, notes = examined(log.truth, log.truth_name, log.streams.get(Sensor.IMU))
     if len(log.truth["t_s"]) and not len(truth["t_s"]):
         note = f"{log.truth_name} is left out: none of its rows is a place within 100 km; metres are needed"
         return replace(log, truth=None, heading_truth=None, notes=(*log.notes, note))

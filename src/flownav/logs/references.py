@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, Table
+from flownav.logs.unfelt import Unfelt, unfelt
 
 FARTHEST_M = 1e5  # from a local origin
 LEAST_LEAP_M, LEAST_LEAP_M_S = 0.5, 20.0  # more than its own motion makes it, and that much per time
@@ -24,6 +25,7 @@ LEAST_SCATTERS = 6.0  # of the path about its motion, that a leap is longer than
 LEAST_MOVE_M, LEAST_ROWS = 1.0, 10  # of an origin; rows before and after
 LEAST_HEIGHTS, LEAST_CLIMB_M, LEAST_LIKENESS = 50, 0.3, 0.9  # readings; rms; correlation that shows up from down
 SHOWN = 3
+MOST_UNFELT = 20  # leaps that no accelerometer felt
 
 
 def upside_down(truth: Table, streams: Mapping[Sensor, Stream]) -> str:
@@ -59,11 +61,12 @@ class Leap(NamedTuple):
     by_ned_m: Array
 
 
-def examined(truth: Table, name: str) -> tuple[Table, tuple[str, ...]]:
+def examined(truth: Table, name: str, imu: Stream | None = None) -> tuple[Table, tuple[str, ...]]:
     """A reference without strays and leaps, and a note on each kind; the table itself where there are none. Rows that
     can be no place are left out, however many they are.
 
-    truth: columns t_s and POSITION_NED at least, in order of time. name: of the reference, for the notes.
+    truth: columns t_s and POSITION_NED at least, in order of time. name: of the reference, for the notes. imu: by which
+    a leap that is spread over many rows is known, where there is one.
     """
     t_s = np.asarray(truth["t_s"], float)
     position = np.column_stack([np.asarray(truth[column], float) for column in POSITION_NED])
@@ -79,11 +82,57 @@ def examined(truth: Table, name: str) -> tuple[Table, tuple[str, ...]]:
     leaps = lasting(leaps_of(t_s[kept], position[kept]), t_s[kept], position[kept])
     for leap in leaps:
         later = np.asarray(table["t_s"], float) >= leap.t_s
-        table = table | {
-            column: np.where(later, np.asarray(table[column], float) - by, table[column])
-            for column, by in zip(POSITION_NED, leap.by_ned_m, strict=True)
-        }
-    return table, (*_of_strays(name, t_s[strays]), *_of_leaps(name, leaps))
+        table = _shifted(table, later, leap.by_ned_m)
+    table, slow = _without_unfelt(table, name, imu)
+    return table, (*_of_strays(name, t_s[strays]), *_of_leaps(name, leaps), *slow)
+
+
+def _shifted(table: Table, later: NDArray[np.bool_], by_ned_m: Array) -> Table:
+    """The table with the places of some rows shifted back."""
+    return table | {
+        column: np.where(later, np.asarray(table[column], float) - by, table[column])
+        for column, by in zip(POSITION_NED, by_ned_m, strict=True)
+    }
+
+
+def _without_unfelt(table: Table, name: str, imu: Stream | None) -> tuple[Table, tuple[str, ...]]:
+    """The table without the leaps that no accelerometer felt and after which its path stays apart, and a note."""
+    notes = []
+    for _ in range(MOST_UNFELT):  # each is taken back before the next is looked for
+        t_s = np.asarray(table["t_s"], float)
+        position = np.column_stack([np.asarray(table[column], float) for column in POSITION_NED])
+        for leap in unfelt(t_s, position, imu):
+            outside = (t_s <= leap.begin_s) | (t_s >= leap.end_s)
+            if _stays(leap, t_s, position):
+                table = _shifted(_rows(table, outside), t_s[outside] >= leap.end_s, leap.by_ned_m)
+                size_m = float(np.linalg.norm(leap.by_ned_m))
+                notes.append(f"by {size_m:.3g} m from {leap.begin_s:.2f} to {leap.end_s:.2f} s")
+                break
+        else:
+            break
+    if not notes:
+        return table, ()
+    return table, (
+        f"{name} leaps {', '.join(notes)}, which no accelerometer felt; these rows are left out, and what follows is "
+        "shifted back",
+    )
+
+
+def _stays(leap: Unfelt, t_s: Array, position: Array) -> bool:
+    """Whether a path (n,), (n, 3) stays apart from where it was going: by its median velocity of a second on either
+    side.
+    """
+    pieces = [
+        _Piece.of(t_s[part], position[part])
+        for part in (
+            (t_s <= leap.begin_s) & (t_s >= leap.begin_s - LEAST_PIECE_S),
+            (t_s >= leap.end_s) & (t_s <= leap.end_s + LEAST_PIECE_S),
+        )
+    ]
+    middle_s = 0.5 * (leap.begin_s + leap.end_s)
+    apart, size_m = pieces[1].at(middle_s) - pieces[0].at(middle_s), float(np.linalg.norm(leap.by_ned_m))
+    scatter_m = max(piece.scatter_m for piece in pieces)
+    return float(apart @ leap.by_ned_m) >= 0.5 * size_m**2 and size_m >= LEAST_SCATTERS * scatter_m
 
 
 def leaps_of(t_s: Array, position: Array) -> list[Leap]:

@@ -25,7 +25,7 @@ def headline(record: Record) -> str:
     elif landing.get("reason") or not place:
         sentences = [f"It did not land{': ' + str(landing['reason']) if landing.get('reason') else ''}."]
     else:
-        sentences = [f"It touched{place}."]
+        sentences = [f"It landed: it touched{place}."]
     sure = sure_at_touchdown_m(record) if place else None
     if sure is not None:
         sentences.append(f"As it touched, the navigator was sure of its place within {metres(sure)} m ({SIGMA}).")

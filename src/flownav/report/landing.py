@@ -287,7 +287,8 @@ def scale_bar(scale: float, lengths_m: Sequence[float] = ROUND_M) -> str:
 def _key(s: Scene, tube: bool) -> str:
     """The names of the colours."""
     band = [("band", "3 \N{GREEK SMALL LETTER SIGMA}")] if tube else []
-    rows = [("truth", "truth"), ("flown", s.name), *band, ("alert", "touchdown")]
+    touch = [("alert", "\N{MULTIPLICATION SIGN} touchdown")]
+    rows = [("truth", "\N{BLACK CIRCLE} truth"), ("flown", "estimate"), *band, *touch]
     return "".join(
         f'<text class="key {role}" x="{CLOSE_PX - 2}" y="{HIGH_PX - 10 - 15 * k}">{escape(name)}</text>'
         for k, (role, name) in enumerate(reversed(rows))
@@ -300,5 +301,6 @@ def _words(s: Scene) -> str:
     off, lasts = metres(float(np.hypot(*s.touch_m))), s.touch_s - float(s.truth.t_s[0])
     return (
         f"The last {lasts:.0f} s before the touchdown, {off} m off the pad's centre, in a loop of {LOOP_S:g} s; the "
-        f"vehicle is to scale. Dashed: {s.name}, what the navigator estimates.{wind}{ring}"
+        "vehicle is to scale, and close up a dot. Dashed: the navigator's estimate that the autopilot uses."
+        f"{wind}{ring}"
     )

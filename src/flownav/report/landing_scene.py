@@ -41,7 +41,6 @@ class Scene(NamedTuple):
     ways: tuple[Course, Course]
     phases: list[Phase]
     three_sigma_m: Array
-    name: str
     touch_s: float
     touch_m: tuple[float, float]
     along: float
@@ -78,7 +77,7 @@ def scene_of(record: Record) -> Scene | None:
     near = [1.6 * contact["distance_m"], r95 or 0.0, 0.03]
     return Scene(
         truth, flown, (ways[0], ways[1]), phases_of(record), three_sigma(record, ways[1].t_s),
-        "autopilot's input" if estimated == "flown" else "estimate", touch_s, touch,
+        touch_s, touch,
         float(truth.heading[-1]), min(max(0.6 * pad_m, reach), 8.0), float(np.max(-truth.ned_m[:, 2])) + shape.high_m,
         1.35 * max(near), pad_m, shape, _wind(record), _others(many), r95,
         int(_numbers(many, ("flights",)).get("flights", 1)),

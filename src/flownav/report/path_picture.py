@@ -31,6 +31,8 @@ from flownav.scoring.phases import Phase, phases_of
 MAP_PX, HEIGHT_PX = 440, 520
 MARGIN_PX = 24.0
 MAP_POINTS, HEIGHT_POINTS, FRAMES = 1500, 300, 72
+AROUND_S = 2.0  # on the ground, before and after what the dot flies
+ON_GROUND = ("ground", "landed")
 LEAST_M = 2.0  # the smallest ground that is shown
 FAR_M = (50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0)
 
@@ -49,11 +51,13 @@ def path_picture(record: Record) -> Picture | None:
     main = _main(shown)
     if main is None:
         return None
-    words = _words(shown, paths, window)
+    phases = phases_of(record)
+    air = _in_the_air(phases, _ends(main))
+    words = _words(shown, paths, window, placed=record.manifest.get("kind") != "fly")
     north = is_north_known(record)
     views = [
-        (_map(shown, main, paths, north=north), MAP_PX),
-        (_height(shown, main, phases_of(record), window), HEIGHT_PX),
+        (_map(shown, main, paths, air, north=north), MAP_PX),
+        (_height(shown, main, phases, window, air), HEIGHT_PX),
     ]
     return Picture(side_by_side(views, words), words)
 
@@ -70,7 +74,7 @@ def _main(shown: list[tuple[str, str, Track]]) -> Track | None:
     return order[0] if order else None
 
 
-def _map(shown: list[tuple[str, str, Track]], main: Track, paths: Paths, *, north: bool) -> str:
+def _map(shown: list[tuple[str, str, Track]], main: Track, paths: Paths, air: Window, *, north: bool) -> str:
     """From above, north up the page where it is known; where GPS was cut, a broad line lies under the path."""
     places = np.vstack([path.value[:, :2] for _, _, path in shown])
     low, high = places.min(axis=0), places.max(axis=0)
@@ -91,12 +95,12 @@ def _map(shown: list[tuple[str, str, Track]], main: Track, paths: Paths, *, nort
         for k, (role, name) in enumerate(rows)
     )
     arrow = '<path class="arrow" d="M14 62V38m-4 7 4-7 4 7"/><text x="14" y="76" text-anchor="middle">N</text>'
-    dot = _dot(placed(at(np.linspace(*_ends(main), FRAMES), main)))
+    dot = _dot(placed(at(np.linspace(*air, FRAMES), main)))
     bar = scale_bar(scale, (*ROUND_M, *FAR_M))
     return view(0, MAP_PX, "The path from above", f"{cut}{drawn}{dot}{key}{arrow if north else ''}{bar}")
 
 
-def _height(shown: list[tuple[str, str, Track]], main: Track, phases: list[Phase], window: Window) -> str:
+def _height(shown: list[tuple[str, str, Track]], main: Track, phases: list[Phase], window: Window, air: Window) -> str:
     """Height over time, on the colours of the phases."""
     heights = np.concatenate([-path.value[:, 2] for _, _, path in shown])
     low, high = float(min(heights.min(), 0.0)), float(max(heights.max(), 1.0))
@@ -122,7 +126,7 @@ def _height(shown: list[tuple[str, str, Track]], main: Track, phases: list[Phase
         for t, side in ((window[0], "start"), (0.5 * sum(window), "middle"), (window[1], "end"))
     )
     drawn = "".join(_drawn(role, placed(_even(path, HEIGHT_POINTS))) for role, _, path in shown)
-    t_s = np.linspace(*_ends(main), FRAMES)
+    t_s = np.linspace(*air, FRAMES)
     dot = _dot(placed(Track(t_s, at(t_s, main))))
     return view(1, HEIGHT_PX, "Height over time, by phase of the flight", f"{bands}{ticks}{times}{drawn}{dot}{key}")
 
@@ -163,8 +167,16 @@ def _dot(way: Array) -> str:
     )
 
 
-def _words(shown: list[tuple[str, str, Track]], paths: Paths, window: Window) -> str:
-    """The picture in words."""
+def _in_the_air(phases: list[Phase], window: Window) -> Window:
+    """From AROUND_S before the vehicle leaves the ground to as long after it is back, in the window; else all of it."""
+    air = [phase for phase in phases if phase.name not in ON_GROUND and phase.t0 < window[1] and phase.t1 > window[0]]
+    if not air:
+        return window
+    return max(window[0], air[0].t0 - AROUND_S), min(window[1], air[-1].t1 + AROUND_S)
+
+
+def _words(shown: list[tuple[str, str, Track]], paths: Paths, window: Window, *, placed: bool) -> str:
+    """The picture in words; placed: whether the other paths were shifted, as those of a log are."""
     names = [name for _, name, _ in shown]
     names_words = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
     path = _main(shown)
@@ -174,4 +186,6 @@ def _words(shown: list[tuple[str, str, Track]], paths: Paths, window: Window) ->
     more = f" and {len(paths.outages) - 3} more times" if len(paths.outages) > 3 else ""
     cut = f" GPS was withheld from {spans}{more} (broad, red)." if paths.outages else ""
     lasts = f"{window[1] - window[0]:.0f} s and some {far:.0f} m over the ground"
-    return f"The path of {lasts}, in a loop of 5 s: {names_words}.{cut}"
+    shifted = " The others are shifted so that they agree with it or with GPS on average."
+    laid = shifted if placed and len(names) > 1 else ""
+    return f"The path of {lasts}: {names_words}. The dot flies the estimate in a loop of 5 s.{laid}{cut}"

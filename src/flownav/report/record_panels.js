@@ -10,6 +10,8 @@ const panels = (() => {
   const DASHES = { truth: [5, 3], command: [2, 3], gate: [6, 4] };
   const WIDTHS = { truth: 1.3, estimate: 1.6, gps: 1.5, flow: 1.5 };
   const FONT = (px) => `${px}px ${flight.colour("font")}`;
+  // A number beside an axis: a tiny one whose zeros would not fit there as a power of ten.
+  const short = (value) => (String(value).length > 7 && Math.abs(value) < 1e-3 ? value.toExponential() : String(value));
   const make = (tag, name, text = "") => Object.assign(document.createElement(tag), { className: name, textContent: text });
 
   class Panel {
@@ -109,7 +111,7 @@ const panels = (() => {
       else across.values = (u, splits) => splits.map((t, n) => (n === splits.length - 1 && n ? `${+t.toFixed(3)} s` : String(+t.toFixed(3)).replace("-", "\u2212")));
       const upright = { ...axis, size: LEFT_PX, space: 26 };
       if (row.log) upright.splits = (u, k_, low, high) => axes.decades(low, high);
-      upright.values = (u, splits) => splits.map((v) => (v === null ? "" : String(+v.toPrecision(6)).replace("-", "\u2212")));
+      upright.values = (u, splits) => splits.map((v) => (v === null ? "" : short(+v.toPrecision(6)).replaceAll("-", "\u2212")));
       const series = [{}];
       const bands = [];
       for (const one of row.lines) {

@@ -2,6 +2,7 @@
 "use strict";
 const paths = (() => {
   const { View, round, metres, ROOM_PX } = canvas;
+  const LABEL_PX = 44; // beside the grid, for the heights at its corner and the arrow to north, however it is turned
 
   class Space extends View {
     constructor(host, data) {
@@ -10,8 +11,10 @@ const paths = (() => {
       this.tilt = 0.42;
       const across = Math.max(this.high[0] - this.low[0], this.high[1] - this.low[1], 1e-3);
       const up = Math.max(this.high[2] - this.floor, 1e-3);
+      this.step = round(Math.max(across, 0.5) / 4);
+      this.edges = [0, 1].map((k) => [Math.floor(this.low[k] / this.step) * this.step, Math.ceil(this.high[k] / this.step) * this.step]);
       this.lift = up > across / 6 && up < 6 * across ? 1 : (0.6 * across) / up;
-      this.middle = [0, 1, 2].map((k) => 0.5 * (this.low[k] + this.high[k]));
+      this.middle = [...this.edges.map(([low, high]) => 0.5 * (low + high)), 0.5 * (this.low[2] + this.high[2])];
       this.canvas.addEventListener("pointerdown", (event) => {
         this.held = [event.clientX, event.clientY];
         this.canvas.setPointerCapture(event.pointerId);
@@ -37,10 +40,11 @@ const paths = (() => {
     }
 
     scale() {
-      const [e, n, h] = [0, 1, 2].map((k) => this.high[k] - this.low[k]);
+      const [e, n] = this.edges.map(([low, high]) => high - low);
+      const h = this.high[2] - this.low[2];
       const across = Math.hypot(e, n) + 1e-3;
       const upright = 0.45 * across + 0.92 * this.lift * Math.max(h, this.high[2] - this.floor, 1e-3);
-      this.zoom = Math.min((this.width - 2 * ROOM_PX) / across, (this.height - 3.2 * ROOM_PX) / upright);
+      this.zoom = Math.min((this.width - 2 * LABEL_PX) / across, (this.height - 3.2 * ROOM_PX) / upright);
     }
 
     project([e, n, h]) {
@@ -53,9 +57,7 @@ const paths = (() => {
     }
 
     scene() {
-      const across = Math.max(this.high[0] - this.low[0], this.high[1] - this.low[1], 0.5);
-      const step = round(across / 4);
-      const edges = [0, 1].map((k) => [Math.floor(this.low[k] / step) * step, Math.ceil(this.high[k] / step) * step]);
+      const { step, edges } = this;
       const rule = flight.colour("rule");
       for (let e = edges[0][0]; e <= edges[0][1] + 1e-9; e += step) this.line([[e, edges[1][0], this.floor], [e, edges[1][1], this.floor]], rule, 1);
       for (let n = edges[1][0]; n <= edges[1][1] + 1e-9; n += step) this.line([[edges[0][0], n, this.floor], [edges[0][1], n, this.floor]], rule, 1);

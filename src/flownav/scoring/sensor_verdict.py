@@ -9,10 +9,10 @@ from flownav.scoring.consistency import MODEST_SQUARES
 MANY_REFUSED = 0.05  # of a sensor's values outside the gate: chance refuses less than one in a hundred
 GOOD, HARMLESS, ACT = "as expected", "harmless", "act"
 MEANING = {
-    HARMLESS: "the noise that is set for the sensor is large enough. It may be lowered in --settings where the scatter "
-    "is less; errors that last do not average out.",
-    ACT: "the sensor is trusted too much, or does not fit the others: `flownav explain` looks for the cause; without "
-    "one state a larger noise in --settings.",
+    HARMLESS: "the noise that is set for the sensor is large enough. It may be lowered in `--settings` where the "
+    "scatter is less; errors that last do not average out.",
+    ACT: "the sensor is trusted too much, or does not fit the others: `flownav explain` looks for the cause; where "
+    "it finds none, state a larger noise in `--settings`.",
 }  # the meaning of each verdict for the estimate's use, and the action to take
 
 

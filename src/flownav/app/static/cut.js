@@ -99,7 +99,7 @@ export function show(main, asked) {
       svg("svg", { class: "chart map", viewBox: `0 0 ${size} ${size}`, role: "img", "aria-label": "The paths from above, north up" },
         svg("polyline", { class: "gps", points: points(answer.gps, at) }),
         svg("polyline", { class: "estimate", points: points(answer.path, at) })),
-      el("figcaption", {}, "From above, north up: the estimate over GPS.")));
+      el("figcaption", {}, "From above, north up: ", el("span", { class: "of-estimate" }, "the estimate"), " over ", el("span", { class: "of-gps" }, "GPS"), ".")));
   }
 
   function draw() {
@@ -108,7 +108,8 @@ export function show(main, asked) {
     if (drawing) return;
     drawMap();
     const figure = (value) => (value === null ? "-" : value.toFixed(2));
-    table.replaceChildren(cuts.length ? el("table", {},
+    const against = answer.against === "GPS" ? "" : " The curve above is against GPS, whose own error is in it.";
+    table.replaceChildren(cuts.length ? el("p", { class: "fine" }, `How far off the estimate was without GPS, against ${answer.against}.${against}`) : "", cuts.length ? el("table", {},
       el("thead", {}, el("tr", {}, ["GPS cut [s]", "rms [m]", "max [m]", ""].map((text) => el("th", { scope: "col" }, text)))),
       el("tbody", {}, cuts.map(([a, b], k) => {
         const cut = answer.outages.find((one) => one.t0 === a && one.t1 === b);
@@ -139,7 +140,8 @@ export function show(main, asked) {
   });
 
   main.replaceChildren(el("h1", {}, "Cut GPS"),
-    el("p", { class: "actions" }, el("label", {}, "Log ", pick), status), chart,
+    el("p", { class: "actions" }, el("label", {}, "Log ", pick), status),
+    el("p", { class: "fine" }, "How far the estimate is from GPS over the flight. Draw along it where GPS is to be missing."), chart,
     el("p", { class: "actions" }, from.box, to.box, add, button("Undo all", () => setCuts([]))), table,
     el("div", { class: "sliders" }, el("label", {}, flow, " Fuse the optical flow"), scale.map(({ box }) => box), delay.box), map, same);
 

@@ -89,7 +89,7 @@ export function show(main, opened) {
     el("div", { class: "sliders" }, [scenario, vehicle, gps, sensor, wind, direction, seed].map(({ box }) => box)),
     status, shown, same, el("h2", {}, "Many flights"),
     el("p", { class: "fine" }, "Each flight draws its own vehicle, wind and sensors about their datasheets; what has flown is kept."), many, cloud);
-  drawMany(false, false, null);
+  if (!folder) drawMany(false, false, null);
   fly();
   follow_cloud();
   const unfollow = follow(({ files }) => {

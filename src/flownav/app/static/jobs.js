@@ -6,7 +6,7 @@ import { button, command, el } from "./dom.js";
 const STATES = { queued: "waits", running: "runs", done: "done", failed: "failed", cancelled: "cancelled" };
 const TITLES = {
   replay: "Report", report: "Report", explain: "Explain", identify: "Identify", compare: "Compare", fly: "Flight",
-  campaign: "Campaign", certify: "Certificate",
+  campaign: "Campaign", certify: "Certificate", live: "Live session", vehicle: "Simulated vehicle",
 };
 const PAGES = ["report", "page", "certificate"], SAVED = ["record", "parameters", "sensor"];
 
@@ -30,6 +30,10 @@ export function links(job) {
 
 function sentence(job) {
   const facts = job.facts || {};
+  if (job.kind === "live" && job.state === "done" && facts.vehicle) {
+    return `${facts.duration_s.toFixed(0)} s, ${facts.sent} estimates sent${job.message ? `; ${job.message}` : ""}`;
+  }
+  if (job.kind === "live" && job.state === "running") return job.ending ? "ends, and writes its record" : job.message;
   return (job.state === "failed" && job.message) || facts.verdict || (facts.findings && facts.findings[0]) || job.message;
 }
 
@@ -39,7 +43,7 @@ export function card(job) {
   return el("li", { class: `job ${job.state}`, "data-job": job.number },
     el("p", {}, el("strong", {}, title), " ", el("span", { class: "state" }, STATES[job.state]),
       running && el("progress", { "aria-label": `${title} runs` }),
-      running && button("Cancel", () => act(() => request(`api/jobs/${job.number}`, { method: "DELETE" })))),
+      running && button(job.kind === "live" ? "Stop" : "Cancel", () => act(() => request(`api/jobs/${job.number}`, { method: "DELETE" })))),
     sentence(job) && el("p", { class: "words" }, String(sentence(job))),
     el("p", { class: "links" }, links(job)),
     command(job.command));

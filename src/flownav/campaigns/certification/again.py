@@ -77,16 +77,16 @@ def fly_again(
         own = table_of(cell, plan.cells[cell].values, part.first, rows, inputs)
         there = kept.slice(part.first - plan.cells[cell].first, 1)
         if digests_of(there, bytes(DIGEST_BYTES)) != digests_of(own, bytes(DIGEST_BYTES)):
-            raise InputError(f"{data.folder}: flight {part.first} of cell {cell} {_difference(there, own)}")
+            raise InputError(f"{data.folder}: flight {part.first} of cell {cell} {difference(there, own, 'flown')}")
 
 
-def _difference(there: Any, own: Any) -> str:
-    """In what a flight of the folder is another than that which is flown; tables of one row."""
+def difference(there: Any, own: Any, made: str) -> str:
+    """In what a flight of the folder is another than that which is made now; tables of one row. made: by which verb."""
     (kept,), (again,) = there.to_pylist(), own.to_pylist()
     differs = [name for name in {**again, **kept} if repr(kept.get(name)) != repr(again.get(name))] or ["a number"]
     more = f" and {len(differs) - 1} more" if len(differs) > 1 else ""
     name = differs[0]
     return (
-        f"is not what is flown: {name}{more} is {kept.get(name)} in the folder and {again.get(name)} flown again; move "
-        "the folder away, and fly it anew"
+        f"is not what is {made}: {name}{more} is {kept.get(name)} in the folder and {again.get(name)} {made} again; "
+        "move the folder away, and fly it anew"
     )

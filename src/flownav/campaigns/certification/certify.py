@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from flownav.campaigns.certification.again import SAMPLE, Again, deciding, drawn, fly_again
 from flownav.campaigns.certification.cells import words_of
 from flownav.campaigns.certification.envelope import Judgement, bad_first, envelope_of, failures_in, judged, outcome
+from flownav.campaigns.certification.remade import require_drawn
 from flownav.campaigns.chain import DIGEST_BYTES, DamagedError, read_part, write_part
 from flownav.campaigns.engines import Engine, Part
 from flownav.campaigns.measures import ROW_COLUMNS, measured
@@ -137,9 +138,11 @@ def certify(
 ) -> Certificate:
     """Fly what the folder lacks of a plan (`certification.cells.plan_of`), and judge it.
 
-    store: open. InputError where a cell cannot be flown.
+    store: open. InputError where a cell cannot be flown, or the folder's flights are not those of the plan.
     """
-    return judged_from(requirement, plan, run_campaign(plan, engine, store, watch))
+    data = run_campaign(plan, engine, store, watch)
+    require_drawn(plan, data)
+    return judged_from(requirement, plan, data)
 
 
 def judged_from(requirement: Requirement, plan: Plan, data: Dataset) -> Certificate:

@@ -1,103 +1,53 @@
 """Checks a certificate's folder: the parts that hold, that do not, and that could not be checked.
 
-Everything that certificate.json states is made anew: files by their hashes, rows by their digests, the plan and every
-figure from the requirement's file and the rows, the page from the figures, and a random sample of the flights by flying
-them, to the bit. Parts that are not checked are named.
+Everything that certificate.json states is made anew: files by their hashes, rows by their digests, the plan from the
+requirement's file, what each flight drew from the plan, every figure from the rows, the page from the figures, and a
+random sample of the flights by flying them, to the bit. Parts that are not checked are named.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any
 
 from flownav.campaigns.certification.again import SAMPLE
 from flownav.campaigns.certification.cells import plan_of
 from flownav.campaigns.certification.certify import Certificate, checked, judged_from, with_ranking
+from flownav.campaigns.certification.findings import NOT_LOOKED_AT, Verification
+from flownav.campaigns.certification.remade import require_drawn
 from flownav.campaigns.certification.signing import SIGNATURE, SIGNATURE_BYTES, is_signed_by, public_key
-from flownav.campaigns.certification.written import FACTS, PAGE, assumed, drawn, hashes_again
+from flownav.campaigns.certification.stated import as_written
+from flownav.campaigns.certification.written import (
+    FACTS,
+    PAGE,
+    assumed,
+    drawn,
+    files_in,
+    hashes,
+    hashes_again,
+    place_of,
+    written,
+)
 from flownav.campaigns.chain import DamagedError, read_part, root_of
 from flownav.campaigns.engines import Engine, Part
 from flownav.campaigns.plan import Plan, Ready
 from flownav.campaigns.requirement import Requirement, load_requirement
-from flownav.campaigns.store import Dataset, plan_in
+from flownav.campaigns.store import LOCK, Dataset, plan_in
 from flownav.core.errors import InputError
 from flownav.core.guard import an_input, object_in
 from flownav.core.measurement import Array
-from flownav.core.parameter_files import shipped
 from flownav.core.provenance import code_sha256, hash_of
 from flownav.core.version import __version__
 from flownav.report.campaign import render_certificate
 
-Found = Literal["holds", "does not hold", "not checked"]
 MOST_FACTS_BYTES = 8 << 20  # of certificate.json, which has some 0.1 MB; lists in it take thirty times as much
+SHOWN = 3  # files that are named
 MADE_ANEW = ("worst", "flown_again")  # facts that need more than the rows
 RANKING_KEYS = ("ranking", "split")
-NEEDED = ("plan", "figures", "flights flown again")  # without these a folder can hold anything
-NOT_LOOKED_AT = (
-    ("flights of the ranking", "their outcomes are held by their hashes; they are not flown again"),
-    ("records of the worst flights", "they are held by their hashes; `flownav report` reads them"),
-    ("whether flights were planned and flown elsewhere before these", "no folder tells; ask who signs"),
-)
-
-
-class Check(NamedTuple):
-    """A checked part, the finding, and a sentence on it."""
-
-    what: str
-    found: Found
-    said: str
-
-
-@dataclass
-class Verification:
-    """The checks of a folder so far. facts: certificate.json."""
-
-    folder: Path
-    facts: dict[str, Any]
-    checks: list[Check] = field(default_factory=list)
-
-    def note(self, what: str, wrong: str | None, right: str) -> bool:
-        """Something that was looked at; wrong: what is wrong with it, None where nothing is. Whether it holds."""
-        self.checks.append(
-            Check(what, "holds" if wrong is None else "does not hold", right if wrong is None else wrong)
-        )
-        return wrong is None
-
-    def leave(self, what: str, why: str) -> None:
-        """Something that could not be looked at."""
-        self.checks.append(Check(what, "not checked", why))
-
-    @property
-    def verification(self) -> str:
-        """Whether it holds; "not shown" where nothing is wrong, but flights or figures could not be looked at."""
-        if any(check.found == "does not hold" for check in self.checks):
-            return "does not hold"
-        shown = {check.what for check in self.checks if check.found == "holds"}
-        return "holds" if shown >= set(NEEDED) else "not shown"
-
-    @property
-    def wrong(self) -> list[str]:
-        """The checks that do not hold; of a certificate that is not shown, those that could not be made and why."""
-        if self.verification == "not shown":
-            return [f"{check.what}: not checked: {check.said}" for check in self.checks
-                    if check.found == "not checked" and set(check.what.split(", ")) & set(NEEDED)]  # fmt: skip
-        return [f"{check.what}: {check.said}" for check in self.checks if check.found == "does not hold"]
-
-    def as_json(self) -> dict[str, Any]:
-        """The checks as `flownav certify --verify --json` prints them."""
-        stored = self.facts.get("requirement")
-        return {
-            "folder": str(self.folder),
-            "requirement": stored.get("name") if isinstance(stored, dict) else None,
-            "verdict": self.facts.get("verdict"),
-            "flights": self.facts.get("flights"),
-            "verification": self.verification,
-            "checks": [check._asdict() for check in self.checks],
-        }
 
 
 def verify(
@@ -128,15 +78,18 @@ def _look(
     if asked is not None:
         chosen = made.facts["chosen"]
         plan = plan_of(asked, chosen["flights"], chosen["vehicle"])
-        certificate = _figures(made, asked, plan) if _plan(made, plan, stored_plan, ours=ours) else None
+        _made_from(made, asked, plan, requirement)
+        sound = _plan(made, plan, stored_plan, ours=ours) and (not ours or _drawn(made, plan))
+        certificate = _figures(made, asked, plan) if sound else None
         if certificate is not None and ours:
             _flights(made, certificate, engine, sample, on_progress)
-            _ranking(made, certificate)
+            _whole(made, _ranking(made, certificate))
             _page(made, certificate)
         elif ours:
             made.leave("flights flown again, page", "they could only be others than those that stand here")
     else:
-        made.leave("plan, figures, flights flown again", "the requirement's file is not there; name it as well")
+        made.leave("plan, flights and inputs, figures, flights flown again",
+                   "the requirement's file is not there; name it as well")  # fmt: skip
     for what, why in NOT_LOOKED_AT:
         made.leave(what, why)
 
@@ -174,6 +127,16 @@ def _files(made: Verification) -> None:
     if needed:
         made.note("files", f"{', '.join(sorted(needed))}: has no hash", "")
     made.note("files", hashes_again(hashes, made.folder), f"{len(hashes)} files have their hashes")
+    others = [name for name in _names_in(made.folder) if name not in {*hashes, FACTS, SIGNATURE, LOCK}]
+    if others:
+        more = f" and {len(others) - SHOWN} more" if len(others) > SHOWN else ""
+        made.leave("files without a hash", f"{', '.join(others[:SHOWN])}{more}: no part of the certificate")
+
+
+def _names_in(folder: Path) -> list[str]:
+    """The files of a folder, by their names relative to it; links to folders are not followed."""
+    found = [Path(place, name) for place, _, names in os.walk(folder) for name in names]
+    return sorted(path.relative_to(folder).as_posix() for path in found)
 
 
 def _rows(made: Verification, plan: dict[str, Any]) -> None:
@@ -201,7 +164,6 @@ def _requirement(made: Verification, named: str | None) -> Requirement | None:
     files = made.facts["files"]["in"]
     first = next(iter(files))
     path = Path(named) if named else place_of(first)
-    wrong = hashes_again({str(place_of(name)): digest for name, digest in list(files.items())[1:]}, None)
     if named is None and not path.is_file():
         return None
     asked = load_requirement(str(path))
@@ -211,17 +173,27 @@ def _requirement(made: Verification, named: str | None) -> Requirement | None:
                     if own != other), None)  # fmt: skip
     if differs is None and len(ours) != len(stated):
         differs = f"it asks for {len(ours)} things, the certificate for {len(stated)}"
-    if differs is None and hash_of(path) != files[first]:
+    if differs is None and hash_of(an_input(path)) != files[first]:
         differs = "it is another than when the flights were flown"
     made.note("requirement", differs and f"{path}: {differs}", f"{path} asks for what was judged")
-    made.note("files that the flights are made from", wrong, f"{len(files)} files have their hashes")
     return asked
 
 
-def place_of(name: str) -> Path:
-    """Where a file lies that went in, by its name in the certificate."""
-    own = "flownav/data/"
-    return shipped(name.removeprefix(own)) if name.startswith(own) else Path(name)
+def _made_from(made: Verification, asked: Requirement, plan: Plan, named: str | None) -> None:
+    """That the certificate has the hashes of all other files that its flights are made from, and of no more."""
+    stated = made.facts["files"]["in"]
+    theirs = [(Path(name).name, digest) for name, digest in stated.items()][1:]
+    path = named or str(place_of(next(iter(stated))))
+    ours = [(Path(name).name, digest) for name, digest in hashes(files_in(path, asked.scenario, plan)).items()][1:]
+    wrong = None
+    for name, digest in ours:
+        if (name, digest) not in theirs:
+            known = any(other == name for other, _ in theirs)
+            wrong = wrong or f"{name}: has {'another SHA-256 than the certificate says' if known else 'no hash'}"
+    strange = next((name for name, digest in theirs if (name, digest) not in ours), None)
+    if wrong is None and strange is not None:
+        wrong = f"{strange}: the flights are not made from it"
+    made.note("files that the flights are made from", wrong, f"{len(stated)} files have their hashes")
 
 
 def _is_of_this_code(made: Verification) -> bool:
@@ -229,7 +201,10 @@ def _is_of_this_code(made: Verification) -> bool:
     if by["flownav"] == __version__ and by["code_sha256"] == code_sha256():
         made.note("version", None, f"flownav {__version__}, of the same code")
         return True
-    made.leave("version, flights flown again, page", f"made by flownav {by['flownav']} of another code than this one")
+    made.leave(
+        "version, flights and inputs, flights flown again, page",
+        f"made by flownav {by['flownav']} of another code than this one",
+    )
     return False
 
 
@@ -242,6 +217,17 @@ def _plan(made: Verification, plan: Plan, stored: dict[str, Any], *, ours: bool)
     differs = ", ".join(key for key in keys if own.get(key) != stored.get(key))
     wrong = f"campaign.json has another {differs} than the requirement makes" if differs else None
     return made.note("plan", wrong, f"seed {plan.seed}, {plan.flights} flights a cell, as the requirement makes them")
+
+
+def _drawn(made: Verification, plan: Plan) -> bool:
+    """That the rows are the plan's flights with the inputs that it draws, all of them."""
+    wrong = None
+    try:
+        require_drawn(plan, Dataset(made.folder))
+    except InputError as error:
+        wrong = str(error)
+    flights = plan.flights * len(plan.cells)
+    return made.note("flights and inputs", wrong, f"all {flights} rows are the plan's, with what it draws for each")
 
 
 def _figures(made: Verification, asked: Requirement, plan: Plan) -> Certificate | None:
@@ -287,11 +273,12 @@ def _flights(
         certificate = checked(certificate, Dataset(made.folder), engine, sample, on_progress)
     except InputError as error:
         wrong = str(error)
-    again = certificate.again
-    statement = (
-        f"{again.sample} of {len(certificate.flown.rows)} drawn at random and {again.margin} at the margin are the same"
-    )
+    again, flights = certificate.again, len(certificate.flown.rows)
+    statement = f"{again.sample} of {flights} drawn at random and {again.margin} at the margin are the same"
     made.note("flights flown again", wrong, statement)
+    left = flights - again.sample - again.margin
+    if wrong is None and left > 0:
+        made.leave("scores of the other flights", f"{left} or more; `--again {flights}` flies all")
 
 
 class _NotFlown:
@@ -306,18 +293,30 @@ class _NotFlown:
         raise InputError("outcomes of its samples are missing or damaged")
 
 
-def _ranking(made: Verification, certificate: Certificate) -> None:
-    """The ranking from the outcomes of its samples."""
+def _ranking(made: Verification, certificate: Certificate) -> Certificate:
+    """The ranking from the outcomes of its samples; the certificate with it, where there is one."""
     wrong, own = None, {key: None for key in RANKING_KEYS}
     try:
         if made.facts["ranking"] is not None:
             rows = made.facts["ranking_rows"]
-            found = with_ranking(certificate, _NotFlown(), made.folder, rows).ranking
-            own = json.loads(json.dumps(found))
+            certificate = with_ranking(certificate, _NotFlown(), made.folder, rows)
+            own = json.loads(json.dumps(certificate.ranking))
         wrong = next((_differs(k, made.facts.get(k), own[k]) for k in own if made.facts.get(k) != own[k]), None)
     except InputError as error:
         wrong = str(error)
     made.note("ranking", wrong, "it is what its outcomes make" if made.facts["ranking"] else "none was asked for")
+    return certificate
+
+
+def _whole(made: Verification, certificate: Certificate) -> None:
+    """That certificate.json is as certify writes it, to the last character, so that it holds nothing more."""
+    stated = made.facts
+    own = as_written(stated, certificate, made.folder)
+    wrong = next((f"{key} is not as certify writes it" for key in own | stated
+                  if json.dumps(own.get(key)) != json.dumps(stated.get(key))), None)  # fmt: skip
+    if wrong is None and (made.folder / FACTS).read_text(encoding="utf-8") != written(own):
+        wrong = "it is not written as certify writes it"
+    made.note(FACTS, wrong, "it has what certify writes, and nothing more")
 
 
 def _page(made: Verification, certificate: Certificate) -> None:

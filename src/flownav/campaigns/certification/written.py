@@ -16,7 +16,9 @@ from flownav.campaigns.measures import MEASURES, NOT_LANDED, ROW_COLUMNS, measur
 from flownav.campaigns.plan import Cell, Plan
 from flownav.campaigns.requirement import requirement_file
 from flownav.campaigns.run import record_again, record_path
-from flownav.campaigns.store import RECORDS, Dataset, Store
+from flownav.campaigns.store import PLAN, RECORDS, Dataset, Store
+from flownav.core.errors import InputError
+from flownav.core.guard import an_input
 from flownav.core.parameter_files import shipped
 from flownav.core.provenance import code_sha256, command_line, hash_of, provenance
 from flownav.report.campaign import render_certificate
@@ -47,12 +49,17 @@ def write_certificate(
     for flight, row in zip(certificate.worst[:records], facts["worst"], strict=False):
         row["record"], row["report"] = _recorded(certificate, flight, store.folder, name)
         on_recorded(1)
-    facts |= {"assumed": assumed(certificate.plan), "made_by": _made_by(), "files": _files(certificate, store, name)}
+    facts |= {"assumed": assumed(certificate.plan), "made_by": made_by(), "files": _files(certificate, store, name)}
     page = render_certificate(facts, drawn(certificate))
     store.keep_text(PAGE, page)
     facts["files"]["page"] = {PAGE: hash_of(store.folder / PAGE)}
-    store.keep_text(FACTS, json.dumps({"schema": SCHEMA} | facts, indent=1) + "\n")
+    store.keep_text(FACTS, written({"schema": SCHEMA} | facts))
     return facts | {"out": str(store.folder / PAGE)}
+
+
+def written(facts: Mapping[str, Any]) -> str:
+    """The text of certificate.json."""
+    return json.dumps(facts, indent=1) + "\n"
 
 
 def drawn(certificate: Certificate) -> dict[str, Any]:
@@ -89,14 +96,18 @@ def _recorded(certificate: Certificate, flight: int, folder: Path, name: str) ->
 
 def _files(certificate: Certificate, store: Store, name: str) -> dict[str, dict[str, str]]:
     """SHA-256 of everything that went in and came out, but for the page and the facts."""
-    folder, data = store.folder, Dataset(store.folder)
-    out = [path for cell in range(len(certificate.plan.cells)) for path in data.parts(cell)]
-    out += sorted((folder / RANKING).glob("*/*.parquet")) + sorted((folder / RECORDS).glob("*"))
     went_in = files_in(name, certificate.requirement.scenario, certificate.plan)
-    return {"in": hashes(went_in), "out": hashes([folder / "campaign.json", *out], folder)}
+    return {"in": hashes(went_in), "out": hashes(files_out(certificate.plan, store.folder), store.folder)}
 
 
-def _made_by() -> dict[str, Any]:
+def files_out(plan: Plan, folder: Path) -> list[Path]:
+    """The files of a certificate's folder that have hashes, but for the page."""
+    parts = [path for cell in range(len(plan.cells)) for path in Dataset(folder).parts(cell)]
+    ranking = sorted((folder / RANKING).glob("*/*.parquet"))
+    return [folder / PLAN, *parts, *ranking, *sorted((folder / RECORDS).glob("*"))]
+
+
+def made_by() -> dict[str, Any]:
     """The command, the versions and the code."""
     made = provenance()
     return {
@@ -234,7 +245,11 @@ def hashes_again(expected: Mapping[str, str], folder: Path | None) -> str | None
         if folder is not None and (Path(name).is_absolute() or ".." in Path(name).parts):
             return f"{name}: lies elsewhere"
         try:
-            found = hash_of(path)
+            if folder is not None and not path.resolve().is_relative_to(folder.resolve()):
+                return f"{name}: is a link to elsewhere"
+            found = hash_of(an_input(path))
+        except InputError as error:
+            return str(error)
         except OSError as error:
             return f"{name}: cannot be read ({error.strerror})"
         if found != digest:
@@ -253,3 +268,9 @@ def hashes(files: Sequence[Path], beside: Path | None = None) -> dict[str, str]:
             name = f"flownav/data/{file.relative_to(data).as_posix()}" if file.is_relative_to(data) else str(file)
         named[name] = hash_of(file)
     return named
+
+
+def place_of(name: str) -> Path:
+    """Where a file lies that went in, by its name in the certificate."""
+    own = "flownav/data/"
+    return shipped(name.removeprefix(own)) if name.startswith(own) else Path(name)

@@ -84,16 +84,19 @@ class Kernel:
     def __init__(self, function: Callable[..., Any]) -> None:
         update_wrapper(self, function)
         self.py_func = function
-        self._count = len(inspect.signature(function).parameters)
+        self._signature = inspect.signature(function)
+        self._count = len(self._signature.parameters)
         self._entries: dict[str, Callable[..., Any]] = {}
         self._dispatcher: Any = None
         self._spared = 0
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
         """Run the compiled code, which is loaded or compiled for such arguments at the first call."""
-        kinds = None if named or len(arguments) != self._count else words_of(arguments)
+        if named or len(arguments) != self._count:
+            arguments = self._in_order(arguments, named)
+        kinds = words_of(arguments)
         if kinds is None:
-            return self.dispatcher(*arguments, **named)
+            return self.dispatcher(*arguments)
         entry = self._entries.get(kinds) or self._entry(kinds, arguments)
         return entry(*arguments)
 
@@ -103,6 +106,12 @@ class Kernel:
         if self._dispatcher is None:
             self._dispatcher = compiler().Dispatcher(self.py_func)
         return self._dispatcher
+
+    def _in_order(self, arguments: tuple[Any, ...], named: dict[str, Any]) -> tuple[Any, ...]:
+        """All arguments by place, with defaults. TypeError where they do not fit the function."""
+        bound = self._signature.bind(*arguments, **named)
+        bound.apply_defaults()
+        return bound.args
 
     def prepare(self, *arguments: Any) -> None:
         """Load or compile the entry for such arguments, and do not run it."""

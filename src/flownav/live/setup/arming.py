@@ -84,7 +84,10 @@ def readiness(talk: Talk, make: str, values: dict[str, Value], origin: Place | N
         place = origin_of_vehicle(talk)
     missing = []
     if origin is not None and place is None:
-        missing.append("the origin was not set: the vehicle is armed, or does not take SET_GPS_GLOBAL_ORIGIN")
+        missing.append(
+            "the origin was not set: the vehicle is armed, its EKF still starts (give it again after 20 s), or it does "
+            "not take SET_GPS_GLOBAL_ORIGIN"
+        )
     elif without and place is None and talk.vehicle.make == ARDUPILOT:
         missing.append(NEEDS_ORIGIN)
     return Readiness(without, place, tuple(missing), tuple(arming_messages(talk)))

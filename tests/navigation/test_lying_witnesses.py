@@ -27,7 +27,7 @@ ANY_READING = {
 # followed before it is suspected, and so is a flow without GPS; an IMU that is reversed, or shakes beyond its sheet,
 # leads height or position away for a moment.
 BEYOND = {
-    ("with GPS", "GPS_VELOCITY", "stuck", "flight"): 1.24, ("with GPS", "GPS_VELOCITY", "sign", "flight"): 3.51,
+    ("with GPS", "GPS_VELOCITY", "stuck", "flight"): 1.50, ("with GPS", "GPS_VELOCITY", "sign", "flight"): 3.51,
     ("without GPS", "FLOW_RATE", "bias", "standing, motors off"): 1.15,
     ("without GPS", "IMU", "sign", "lift-off"): 1.49, ("without GPS", "IMU", "sign", "flight"): 1.15,
     ("without GPS", "IMU", "noise", "lift-off"): 1.71,

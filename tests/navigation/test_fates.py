@@ -127,12 +127,13 @@ def test_what_leapt_along_down_is_not_followed_while_the_range_holds_the_height(
     assert (first.memory.witness.leapt, late.memory.witness.leapt) == (1.0, 0.0)
 
 
+DOUBTED = FlowMemory(taken_s=98.9, doubted=1.0)  # flow that carries the state, and is doubted
 LEAPT = WitnessMemory(times=300.0, since_s=35.0, fused_s=34.8, leapt=1.0)  # JUMPED_S ago, and a moment before fused
 
 
 def test_a_position_whose_velocity_agrees_is_off_itself_and_its_slow_error_takes_it():
     """The position and the pad stay, the level holds nothing of it, and no reset is written."""
-    found = fate(often=LEAPT, agreed_s=98.8, pad=LEFT)
+    found = fate(often=LEAPT, agreed_s=98.8, flow=DOUBTED, pad=LEFT)
     assert placed(found.goes) == [(GPS_SLOW + 1, 1001.5)]
     assert found.goes[0].variance == pytest.approx(TOLD.gps.gps_slow_sigma_m**2)
     assert found.event.kind == -1
@@ -140,7 +141,7 @@ def test_a_position_whose_velocity_agrees_is_off_itself_and_its_slow_error_takes
     assert found.tie.reason == SILENT
     assert (found.memory.gps.moved_n_m, found.memory.gps.moved_e_m) == (1.0, 2.0)
     assert (found.memory.witness.times, found.memory.witness.fused_s) == (0.0, 99.0)
-    early = fate(often=LEAPT._replace(since_s=40.0), agreed_s=98.8)
+    early = fate(often=LEAPT._replace(since_s=40.0), agreed_s=98.8, flow=DOUBTED)
     assert placed(early.goes) == []
     assert early.memory.witness.fused_s == 34.8
 
@@ -152,10 +153,20 @@ def test_who_is_off_is_decided_by_flow_where_the_velocity_is_silent_or_was_refus
         return [state for state, _ in placed(fate(often=LEAPT, **case).goes)]
 
     assert gone(flow=flows) == slow
-    assert gone(agreed_s=97.0) == all_of_it
-    assert gone(agreed_s=98.8, agrees_since_s=35.0) == all_of_it
-    assert gone(agreed_s=98.8, agrees_since_s=34.0) == slow
-    assert gone(agreed_s=98.8, flow=FlowMemory(doubted=1.0)) == slow
+    assert gone(agreed_s=97.0, flow=DOUBTED) == all_of_it
+    assert gone(agreed_s=98.8, agrees_since_s=35.0, flow=DOUBTED) == all_of_it
+    assert gone(agreed_s=98.8, agrees_since_s=34.0, flow=DOUBTED) == slow
+
+
+def test_a_receiver_alone_is_followed_where_no_flow_carries_the_state():
+    all_of_it = [GPS_SLOW + 1, GPS_FAST + 1, POSITION + 1]
+    for flow in (FlowMemory(), FlowMemory(taken_s=97.4), FlowMemory(taken_s=97.4, doubted=1.0)):
+        found = fate(often=LEAPT, agreed_s=98.8, flow=flow)
+        assert [state for state, _ in placed(found.goes)] == all_of_it
+    assert [state for state, _ in placed(fate(axis=2, often=LEAPT, agreed_s=98.8, flow=DOUBTED).goes)] != [GPS_SLOW + 2]
+    held = RangeMemory(taken_s=97.6, refused_s=60.0)
+    found = fate(axis=2, often=LEAPT, agreed_s=98.8, ranged=held)
+    assert [state for state, _ in placed(found.goes)] == [GPS_SLOW + 2]
 
 
 def test_what_a_velocity_could_have_moved_unseen_is_no_fault_of_the_receiver():
@@ -165,10 +176,8 @@ def test_what_a_velocity_could_have_moved_unseen_is_no_fault_of_the_receiver():
     assert silent.memory.witness.leapt == 0.0  # flow, which may have failed meanwhile
     for innovation_m, blamed in ((11.0, 0.0), (11.4, 1.0), (-11.4, 1.0)):
         refused = verdicts.Tested(INNOVATION_GATE, innovation_m, 1.0, 0.25)
-        assert fate(refused, often=quiet, agreed_s=98.8).memory.witness.leapt == blamed
-        assert (
-            fate(refused, often=quiet._replace(times=3.0, since_s=80.0), agreed_s=98.8).memory.witness.leapt == blamed
-        )
+        for often in (quiet, quiet._replace(times=3.0, since_s=80.0)):
+            assert fate(refused, often=often, agreed_s=98.8, flow=DOUBTED).memory.witness.leapt == blamed
         later = fate(refused, often=quiet._replace(times=3.0, since_s=80.0, leapt=1.0))
         assert later.memory.witness.leapt == 1.0
 

@@ -244,7 +244,9 @@ def judge_fate(
     ratio = gate_ratio(tested, s.gate_sigma) if tested.reason == INNOVATION_GATE else 0.0
     flowed = not doubted and t_s - flow.taken_s <= MOMENT_S
     above = not np.isfinite(ranged.refused_s) and t_s - ranged.taken_s <= MOMENT_S
-    agrees = position and t_s - along.agreed_s <= MOMENT_S and along.agrees_since_s <= m.fused_s
+    carried_s = ranged.taken_s if axis == 2 else flow.taken_s
+    agreed = t_s - along.agreed_s <= MOMENT_S and along.agrees_since_s <= m.fused_s
+    agrees = position and agreed and t_s - carried_s <= MOMENT_S
     seen = agrees or (above if axis == 2 else flowed)
     fused_s = t_s - m.fused_s
     leapt_now = leaps(tested, ratio, position, along.velocity_variance, fused_s) and (agrees or fused_s <= MOMENT_S)

@@ -163,6 +163,7 @@ def test_a_damaged_part_of_a_campaign(certificate, tmp_path, pattern):
     path = tmp_path / "part.parquet"
     path.write_bytes(whole)
     intact = read_part(path)
+    written = repr(intact.table.to_pydict())
 
     def read(path: Path) -> Any:
         try:
@@ -171,8 +172,9 @@ def test_a_damaged_part_of_a_campaign(certificate, tmp_path, pattern):
             raise InputError(str(error)) from error
 
     def sound(found: Any) -> None:
-        assert found.table.equals(intact.table)
+        assert found.table.schema.equals(intact.table.schema)
         assert found[1:] == intact[1:]
+        assert repr(found.table.to_pydict()) == written  # a NaN is not equal to itself
 
     for seed in range(FIRST_SEED, FIRST_SEED + MUTANTS):
         path.write_bytes(mutate(whole, whole, seed))

@@ -42,11 +42,19 @@ def read_footer(data: bytes) -> Footer:
     if length > MOST_FOOTER:
         raise ValueError("its footer is too long")
     meta, _ = _structure(data[-8 - length : -8], 0, 0)
-    groups = meta.get(GROUPS) or []
+    groups = _structures(meta, GROUPS)
     rows: list[int] = [_number(group, GROUP_ROWS) for group in groups]
     if sum(rows) != _number(meta, ROWS) or (any(rows) and 0 in rows):
         raise ValueError("its parts do not have the rows that it says")
-    return Footer(rows, [[_chunk(column) for column in group.get(GROUP_COLUMNS) or []] for group in groups])
+    return Footer(rows, [[_chunk(column) for column in _structures(group, GROUP_COLUMNS)] for group in groups])
+
+
+def _structures(fields: dict[int, Any], field: int) -> list[dict[int, Any]]:
+    """A list of structures; none where the field is missing or null. ValueError where it is anything else."""
+    found = fields.get(field) or []
+    if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
+        raise ValueError("a list of its parts is none")
+    return found
 
 
 def _chunk(column: dict[int, Any]) -> Chunk:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from flownav.live.options import Options
     from flownav.live.recorder import Recorder
     from flownav.live.session import Session
+    from flownav.live.status import Status as State
 
 
 URL = "udp:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:PORT or serial:DEVICE[:BAUD]."
@@ -124,7 +125,7 @@ def _navigate(
     from flownav.live.recorder import facts_every_second
     from flownav.live.screen import Screen, traffic_facts
     from flownav.live.session import Session
-    from flownav.live.status import Status
+    from flownav.live.status import Status as State
 
     warm_up()
     shown = not as_json and sys.stdout.isatty()
@@ -143,9 +144,11 @@ def _navigate(
         def screen() -> Screen:
             return Screen(session, latency, url, recorder, scheduling, link)
 
+        def state() -> State:
+            return State(session, screen(), url, recorder.path if recorder else None, now_s)
+
         with stoppable() as asked:
-            state = Status(session, screen(), url, recorder.path if recorder else None, now_s)
-            with on_terminal(screen().view, shown=shown) as display, _status_file(status, state.look) as shows:
+            with on_terminal(screen().view, shown=shown) as display, _status_file(status, state) as shows:
                 shows += [display.show, *([facts_every_second(recorder, facts_now)] if recorder is not None else [])]
                 run_session(session, link, latency, lambda: asked() or time.monotonic() >= end_s, shows)
             run_as_others()
@@ -192,7 +195,7 @@ def _recording(url: str, path: Path | None, options: Options, *, force: bool, sh
 
 
 @contextmanager
-def _status_file(path: Path | None, look: Callable[[float], dict[str, Any]]) -> Iterator[list[Callable[[float], None]]]:
+def _status_file(path: Path | None, state: Callable[[], State]) -> Iterator[list[Callable[[float], None]]]:
     """The functions that the loop calls to have the status written; none where none is asked for."""
     from flownav.live.status import StatusFile
 
@@ -204,7 +207,7 @@ def _status_file(path: Path | None, look: Callable[[float], dict[str, Any]]) -> 
         with suppress(OSError):
             print(f"flownav: {path}: cannot be written ({reason}); the session goes on", file=sys.stderr, flush=True)
 
-    with closing(StatusFile(path, look, failed)) as file:
+    with closing(StatusFile(path, state().look, failed)) as file:
         yield [file.show]
 
 

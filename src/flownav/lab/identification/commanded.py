@@ -290,7 +290,6 @@ def stir_in(flight: Commanded) -> Array | None:
     cyclic = flight.command[:, 1::-1] - flight.command[:, 1::-1].mean(axis=0)  # lon and lat, as STIR has them
     if len(cyclic) < STIR_EPOCHS:
         return None
-    folded = np.zeros((STIR_EPOCHS, 2))
     whole = len(cyclic) // STIR_EPOCHS * STIR_EPOCHS
     folded = cyclic[:whole].reshape(-1, STIR_EPOCHS, 2).sum(axis=0)
     spectrum = np.conj(np.fft.rfft(STIR, axis=0)) * np.fft.rfft(folded, axis=0)

@@ -62,8 +62,8 @@ def test_down_the_hill_below_the_pads_height_is_not_below_the_ground():
 def test_over_a_decks_edge_and_back_the_range_jumps_and_the_landing_holds():
     """From the pad on a deck out over the edge, a metre down, and back: the navigator's range sees two grounds.
 
-    Until it believes in each, flow is taken over a height that is wrong by a metre: it lands some 2.2 m to the north
-    (1.3 while every sway made the ground less sure: `navigation/ground.py`).
+    Until it believes in each, flow is taken over a height that is wrong by a metre: it lands some 0.7 m off, 0.5 m
+    farther than over one ground.
     """
     path = [
         {"t_s": 0.0, "height_m": 0.0}, {"t_s": 5.0, "height_m": 0.0}, {"t_s": 8.0, "height_m": 2.0},
@@ -80,7 +80,7 @@ def test_over_a_decks_edge_and_back_the_range_jumps_and_the_landing_holds():
     assert over[840:900].mean(axis=0) == pytest.approx(2.2, abs=0.3)  # it flies over the ground that it finds
     assert over[100:].min() > 0.15  # and meets neither the edge's face nor the deck but with its skids
     assert landed(scores).all()
-    assert np.median(scores["touchdown.rest.distance_m"]) < 2.6
+    assert np.median(scores["touchdown.rest.distance_m"]) < 1.2
 
 
 # -- the engine ------------------------------------------------------------------------------------------------------

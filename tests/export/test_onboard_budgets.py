@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flownav.core.errors import InputError
-from flownav.core.measurement import Sensor
+from flownav.core.measurement import Sensor, Stream
 from flownav.export.onboard.board import NOTHING, Board
 from flownav.export.onboard.code import WITHOUT
 from flownav.export.onboard.interface import Rates
@@ -17,6 +17,8 @@ from flownav.export.onboard.library_boards import LibraryBoard, library_board
 from flownav.export.onboard.package import Asked, code_of
 from flownav.export.onboard.targets import TARGETS
 from flownav.navigation import progress, waiting
+from flownav.navigation.memory import PAD_KNOWN
+from flownav.navigation.pad import STOOD_ON
 from flownav.navigation.rings import Given, numbers_of
 from navigation_streams import circle, fly
 from onboard_readings import RATES, arriving, flight_of, settings_of, spoilt
@@ -63,6 +65,21 @@ def test_no_call_on_a_cortex_m7_takes_longer_than_it_may(sensors, tmp_path):
     assert sum(calls) / (readings[-1].t_s - readings[0].t_s) <= MOST_A_SECOND
     assert board.stack_bytes <= MOST_STACK
     assert sum(calls) > 1e6  # it was counted
+
+
+def test_a_report_of_landed_takes_no_longer_where_it_ties_the_vehicle_to_its_pad(tmp_path):
+    stood = fly(lambda t_s: np.column_stack([0.0 * t_s, 0.0 * t_s, 0.0 * t_s - 0.1]), 6.0)
+    t_s = np.arange(0.5, 6.0, 0.25)
+    landed = stood.added(Stream.of(Sensor.LANDED, t_s, np.ones((len(t_s), 1))))
+    settings, _ = settings_of(flight_of(landed))
+    board, here = library_board("cortex-m7", settings, RATES.sizes, tmp_path), Board(settings, RATES.sizes)
+    readings = arriving(landed)
+    calls = counted(board, readings)
+    assert max(calls) <= MOST_A_CALL
+    for given in readings:
+        here.take(given)
+    assert board.digest() == here.digest()
+    assert here.work[PAD_KNOWN] == STOOD_ON
 
 
 def test_a_gap_a_leap_and_garbage_take_no_longer(tmp_path):

@@ -169,7 +169,7 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
     Written out, with c = P h', S = h c + R and d = c - K S/2, it is P - (K d' + d K'), whatever the gain (Bucy and
     Joseph, Filtering for Stochastic Processes with Applications to Guidance, 1968). That of the considered states is 0:
     they stay as they are, and their uncertainty counts (Schmidt, Application of State-Space Methods to Navigation
-    Problems, 1966). So are the hypotheses' columns, what one unit of a fault does to the error: with k = SHARE,
+    Problems, 1966). So is that of the hypotheses' columns, what one unit of a fault does to the error: with k = SHARE,
     s <- s - K (k h s + h_b) (`hypotheses`).
     """
     fused_lanes = 0
@@ -208,12 +208,17 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
             before = work[(STATE + i) * len(lanes) + lane]
             after = before + work[(GAIN + i) * len(lanes) + lane] * innovation
             work[(STATE + i) * len(lanes) + lane] = after if fused else before
-    for j in range(columns):
-        for i in range(min(j + 1, n)):
+    for j in range(n):
+        for i in range(j + 1):
             for lane in range(len(lanes)):
                 gain_i, gain_j = work[(GAIN + i) * len(lanes) + lane], work[(GAIN + j) * len(lanes) + lane]
                 rest_i, rest_j = work[(REST + i) * len(lanes) + lane], work[(REST + j) * len(lanes) + lane]
                 work[at(i, j) * len(lanes) + lane] -= gain_i * rest_j + gain_j * rest_i
+    for j in range(n, columns):
+        for i in range(n):
+            for lane in range(len(lanes)):
+                gain_i, rest_j = work[(GAIN + i) * len(lanes) + lane], work[(REST + j) * len(lanes) + lane]
+                work[at(i, j) * len(lanes) + lane] -= gain_i * rest_j
     fold_attitude(work, lanes)
 
 

@@ -106,28 +106,50 @@ def observed(shape: Shape) -> Complex:
     return np.asarray(low_pass * hold(w, FLOWN.outer_s) * np.exp(-1j * w * FLOWN.estimate_delay_s))
 
 
+class Paths(NamedTuple):
+    """The cyclic per tilt, rate, velocity and position, (4, n) each: past the commanded tilt, and through it."""
+
+    past_command: Complex
+    by_command: Complex
+
+
+def paths_of(shape: Shape, axis: Axis) -> Paths:
+    """`feedback`, by whether it passes the commanded tilt."""
+    attitude = shape.attitude + shape.attitude_integral_1_s * integral(OMEGA_RAD_S, FLOWN.inner_s)
+    tilt, rate, velocity, position = feedback(shape, axis)
+    through_command = hold(OMEGA_RAD_S, FLOWN.outer_s) * attitude * observed(shape)
+    none = np.zeros_like(tilt)
+    return Paths(
+        np.array([tilt - through_command, rate, none, none]), np.array([through_command, none, velocity, position])
+    )
+
+
 def loops_of(shape: Shape, axis: Axis) -> Complex:
     """Cut at the cyclic, the rate, the tilt command and the velocity command, the others closed, (corners, 4, n)."""
-    attitude = shape.attitude + shape.attitude_integral_1_s * integral(OMEGA_RAD_S, FLOWN.inner_s)
-    through_command = hold(OMEGA_RAD_S, FLOWN.outer_s) * attitude * observed(shape)
-    tilt, rate, velocity, position = (gain * axis.by_cyclic[:, i] for i, gain in enumerate(feedback(shape, axis)))
-    commanded = through_command * axis.by_cyclic[:, 0] + velocity + position
-    total = tilt + rate + velocity + position
-    cuts = (total, rate, commanded, position)
+    return cuts_of(paths_of(shape, axis), axis)
+
+
+def cuts_of(paths: Paths, axis: Axis) -> Complex:
+    """`loops_of` for any law that is linear."""
+    past, commanded = (path * axis.by_cyclic for path in paths)
+    total = past.sum(axis=1) + commanded.sum(axis=1)
+    cuts = (total, past[:, 1], commanded.sum(axis=1), commanded[:, 3])
     return np.stack([-cut / (1.0 - (total - cut)) for cut in cuts], axis=1)
 
 
 def drift_m(shape: Shape, axis: Axis) -> float:
     """Standard deviation of the position in turbulence and under a false tilt [m], the vehicle as stated."""
-    w, gains = OMEGA_RAD_S, feedback(shape, axis)
+    return drift_by(paths_of(shape, axis), axis)
+
+
+def drift_by(paths: Paths, axis: Axis) -> float:
+    """`drift_m` for any law that is linear."""
+    w, gains = OMEGA_RAD_S, paths.past_command + paths.by_command
     cyclic, gust = axis.by_cyclic[0], axis.by_gust[0]
-    answered = sum(gain * gust[i] for i, gain in enumerate(gains))
-    total = sum(gain * cyclic[i] for i, gain in enumerate(gains))
+    answered, total = (gains * gust).sum(axis=0), (gains * cyclic).sum(axis=0)
     by_gust = gust[3] + cyclic[3] * answered / (1.0 - total)
-    by_offset = 1.0 / (w * w * (1.0 + loops_of(shape, axis)[0, 2]))
-    power = np.abs(by_gust) ** 2 * _spectrum(GUST_M_S, GUST_S) + np.abs(by_offset) ** 2 * _spectrum(
-        OFFSET_M_S2, OFFSET_S
-    )
+    by_offset = 1.0 / (w * w * (1.0 + cuts_of(paths, axis)[0, 2]))
+    power = np.abs(by_gust) ** 2 * spectrum(GUST_M_S, GUST_S) + np.abs(by_offset) ** 2 * spectrum(OFFSET_M_S2, OFFSET_S)
     return float(np.sqrt(np.trapezoid(power, w)))
 
 
@@ -185,7 +207,7 @@ def shaped(name: str, start: AutopilotGains, path: Path | None = None, *, rounds
     return shape, drift_m(shape, axis)
 
 
-def _spectrum(sigma: float, time_s: float) -> Array:
+def spectrum(sigma: float, time_s: float) -> Array:
     """One-sided density over angular frequency of a first-order process, (n,)."""
     return np.asarray(sigma**2 * 2.0 * time_s / np.pi / (1.0 + (time_s * OMEGA_RAD_S) ** 2))
 

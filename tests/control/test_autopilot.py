@@ -84,6 +84,28 @@ def test_nose_up_and_roll_right_errors_are_pushed_back_and_a_turn_is_stopped():
     assert ped < GAINS.pedal_trim_rad
 
 
+def test_a_vehicle_that_presses_on_lets_its_thrust_go_where_the_ground_holds_it_up():
+    """Below the gate, from half a landing's speed less on; the attitude stays held, and in the air it flies on."""
+    legs = GAINS._replace(presses_on=1.0, commit_height_m=0.05, land_height_m=1.0, land_speed_m_s=0.3)
+    falls = Reference(0.0, 0.0, 1.0, 0.0, 0.0, 0.3)
+    settled = GAINS.collective_trim_rad - 0.02 * GAINS.spool_rate_rad_s
+
+    def after(gains=legs, height_m=0.01, sink_m_s=0.0, contact_time_s=0.0):
+        state = hovering(gains)._replace(contact_time_s=contact_time_s)
+        here = HERE._replace(pos_d=-height_m, w=sink_m_s)
+        return outer_loop(state, falls, here, KNOWN, LEVEL, gains, 1.0, 0.02)
+
+    held = after()
+    assert held.collective_command == pytest.approx(settled)
+    assert held.flying == 1.0
+    assert after(sink_m_s=0.14).collective_command == pytest.approx(settled)
+    assert after(sink_m_s=0.16).collective_command > settled
+    assert after(height_m=0.06).collective_command > settled
+    assert after(height_m=0.06, sink_m_s=0.3, contact_time_s=0.02).collective_command == pytest.approx(settled)
+    assert after(legs._replace(presses_on=0.0)).collective_command > settled
+    assert after(legs._replace(presses_on=0.0), contact_time_s=0.02).collective_command > settled
+
+
 def test_touchdown_needs_a_tenth_of_a_second_of_weight_and_is_final():
     def logic(state, force, may_land=1.0):
         return autopilot.landing_logic(state, force, 10.0, 1.0, may_land, 0.02)

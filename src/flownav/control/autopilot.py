@@ -117,6 +117,18 @@ def landing_logic(
     return with_contact(state, flying=flying, contact_time_s=contact_time)
 
 
+HELD_UP_SHARE = 0.5  # chosen: of the landing's speed; gusts leave a fifth
+
+
+@equation
+def held_up(slower_m_s: float, height_m: float, gains: AutopilotGains) -> bool:
+    """Below the gate the ground, not the rotors, stops the descent: it sinks slower than commanded by slower_m_s.
+
+    A switch under the skids closes later, when they carry a good part of the weight.
+    """
+    return height_m < gains.commit_height_m and slower_m_s > HELD_UP_SHARE * gains.land_speed_m_s
+
+
 @equation
 def along_heading(rotation: Rotation, n: float, e: float) -> tuple[float, float]:
     """A horizontal vector, forward along the heading and to its right."""
@@ -138,7 +150,7 @@ def unexplained_acceleration(estimate: Estimate, rotation: Rotation, gains: Auto
 
 class Steered(NamedTuple):
     """Velocity still to be gained, forward along the heading, to its right and down [m/s]; whether the pad is looked
-    for; since when the vehicle waits at the gate or aloft [s]; and what becomes of the landing.
+    for; since when the vehicle waits at the gate or aloft [s]; what becomes of the landing; whether it touches.
     """
 
     forward: float
@@ -147,6 +159,7 @@ class Steered(NamedTuple):
     looking: bool
     waited_s: float
     around: guidance.GoAround
+    touching: bool
 
 
 @equation
@@ -187,7 +200,8 @@ def steer(
     waited_s = state.waited_s + dt if (waiting and landing) or away else state.waited_s
 
     error_forward, error_right = along_heading(rotation, vel_n - est_n, vel_e - est_e)
-    return Steered(error_forward, error_right, vel_d - est_d, looking, waited_s, around)
+    touching = state.contact_time_s > 0.0 or (landing and not away and held_up(vel_d - est_d, height_m, gains))
+    return Steered(error_forward, error_right, vel_d - est_d, looking, waited_s, around, touching)
 
 
 @equation
@@ -196,7 +210,7 @@ def outer_loop(
     gains: AutopilotGains, may_land: float, dt: float,
 ) -> AutopilotState:  # fmt: skip
     """Position and velocity errors to tilt and collective commands (50 Hz)."""
-    error_forward, error_right, error_down, looking, waited_s, around = steer(
+    error_forward, error_right, error_down, looking, waited_s, around, touching = steer(
         state, reference, estimate, known, rotation, gains, may_land, dt
     )
     felt_forward, felt_right = unexplained_acceleration(estimate, rotation, gains)
@@ -215,6 +229,7 @@ def outer_loop(
     )
     most = gains.collective_limit_rad + (guidance.FLARE_RAD if guidance.powerless(known) else 0.0)
     in_flight = gains.collective_trim_rad + clamp(collective, -gains.collective_limit_rad, most)
+    pressed = not flying or (touching and gains.presses_on > 0.0)
     settling = state.collective_command - gains.spool_rate_rad_s * dt
     on_ground = settling if settling > gains.idle_collective_rad else gains.idle_collective_rad
     facing = faced(
@@ -233,7 +248,7 @@ def outer_loop(
         collective=heave if flying else 0.0,
         pitch_sine=gains.pitch_trim_sine + pitch,
         roll_sine=gains.roll_trim_sine + roll,
-        collective_command=in_flight if flying else on_ground,
+        collective_command=on_ground if pressed else in_flight,
         waited_s=waited_s if around.away == state.away else 0.0,
         searched_s=state.searched_s + dt if looking else 0.0,
         away=around.away,

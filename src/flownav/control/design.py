@@ -137,7 +137,7 @@ ROTORS_GUST_S = 0.109  # the disturbance observer's low-pass
 CLIMB_LIMIT_SHARE = 0.25  # about trim
 TILT_LIMIT_SHARE = 0.3
 YAW_LIMIT_SHARE = 0.15
-SPOOL_S = 1.0  # from hover to idle after touchdown: chosen
+SPOOL_S = 0.25  # from hover to idle, from the first touch on: chosen; on legs half light it slides (control.md)
 
 
 def multirotor_gains(
@@ -170,6 +170,7 @@ def multirotor_gains(
         **_at_rest(vehicle, hover),
         idle_collective_rad=vehicle.idle_share,
         spool_rate_rad_s=hover.controls.col / SPOOL_S,
+        presses_on=1.0,
     )
 
 

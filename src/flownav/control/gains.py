@@ -43,6 +43,7 @@ class AutopilotGains(NamedTuple):
     pedal_per_collective: float = 0.0  # what holds the heading against the main rotor's torque, about trim
     sink_limit_m_s: float = 1e9  # faster a rotor sinks into its own wake
     spool_rate_rad_s: float = 0.20  # how fast the collective goes down to idle after touchdown
+    presses_on: float = 0.0  # 1.0: it goes down from the first touch, the attitude still held
     # the last metres of a precision landing: nothing of it where the limits are as here
     pad_pos_d_m: float = 0.0  # of the reference point when the skids touch
     skids_below_cg_m: float = 0.0  # it is their middle that is brought over the pad

@@ -14,17 +14,8 @@ from app_pages import Tab, served
 from flownav.app.sessions import sessions_in
 from flownav.core.record import Record
 from live_process import free_port
+from live_states import FRESH_S, STATE, Written
 from played_link import PlayedLink
-
-STATE = {
-    "live_status": 1, "url": "udp:14550", "record": "flight.fnr", "process": 1, "lasted_s": 61.0,
-    "vehicle": {"system": 1, "component": 1}, "send": "odometry", "listens": False, "reason": "", "why": "",
-    "for_s": 4.0, "velocity_only": False, "sent": 1234, "withheld": {"the vehicle is being listened to": 12},
-    "protection_m": [1.5, 0.7], "suspected": "", "limits": {"protection_m": 20.0}, "here_ned_m": [3.0, -4.0, -5.0],
-    "pad_m": [0.0, 0.0], "quality_percent": 73, "three_sigma_m": [0.4, 0.5, 0.3], "vel_ned_m_s": [0.3, 0.4, 0.0],
-    "three_sigma_m_s": [0.1, 0.1, 0.1], "path": [[0, 0, 0], [1, -1, 0], [2, -3, 1], [3, -4, 1]],
-    "sensors": [["flow_rate", "50", "0.01", "0.02", "0.1", "0.2", ""]], "alarms": [], "lines": ["recording: x"],
-}  # fmt: skip
 
 
 @pytest.fixture
@@ -112,19 +103,6 @@ def test_a_simulated_vehicle_flies_for_a_port_of_this_machine(page):
 
 
 # -- in the browser ------------------------------------------------------------------------------------------------
-class Written:
-    """A session's state, written as a session would; a rename, so that nobody reads half of it."""
-
-    def __init__(self, folder, name="flight.live.json"):
-        self.path = folder / name
-
-    def state(self, age_s=0.0, **changed):
-        part = self.path.with_suffix(".part")
-        part.write_text(json.dumps({**STATE, **changed}))
-        os.utime(part, (time.time() - age_s,) * 2)
-        part.rename(self.path)
-
-
 @pytest.fixture
 def served_folder(tmp_path):
     with served(desk_of(tmp_path)) as address:
@@ -133,9 +111,6 @@ def served_folder(tmp_path):
 
 def alarm_of(tab):
     return tab.page.locator("section.session [role=alert]")
-
-
-FRESH_S = -3600.0  # a state that does not grow old while a test on a loaded machine looks at it
 
 
 @pytest.mark.browser
@@ -184,6 +159,22 @@ def test_the_path_is_drawn_to_scale_and_red_where_nothing_was_sent(browser, serv
     pad = tab.page.locator("section.session rect.pad")
     north = float(pad.get_attribute("y")) + 6.0 - float(place.get_attribute("cy"))
     assert north == pytest.approx(3.0 * length / metres, rel=1e-3), "the pad is south of the vehicle, below it"
+    tab.close(address)
+
+
+@pytest.mark.browser
+def test_a_protection_level_is_a_whole_circle_or_a_figure_where_it_is_wider_than_the_picture(browser, served_folder):
+    folder, address = served_folder
+    session, tab = Written(folder), Tab(browser, address)
+    session.state(FRESH_S, protection_m=[9.0, 1.0])  # the path spans 4 m
+    circle = tab.page.locator("section.session circle.level")
+    circle.wait_for()
+    x, y, radius = (float(circle.get_attribute(name)) for name in ("cx", "cy", "r"))
+    assert min(x, y) - radius > 0.0
+    assert max(x, y) + radius < 420.0
+    session.state(FRESH_S, protection_m=[60.0, 1.0])
+    tab.page.get_by_text("the protection level, 60 m about the vehicle, is wider than the picture").wait_for()
+    assert circle.count() == 0
     tab.close(address)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,9 @@ from blackbox_logs import blackbox_log, quantised
 from crazyflie_logs import deck_log
 from crazyflie_logs import quantised as deck_tables
 from dataflash_files import dataflash_of
+from flownav.app.shelf import Shelf
+from flownav.app.tasks import task_of
+from flownav.campaigns.requirement import load_requirement
 from flownav.core.record import Record
 from mavlink_logs import flight_log
 from replay_logs import log_of_flight
@@ -54,6 +58,9 @@ def content_of(name: str, flown, tmp_path: Path) -> bytes:
     return (tmp_path / "x.fnr").read_bytes()
 
 
+WRITTEN_BY = {"log.ulg": "px4", "log.bin": "ardupilot", "log.bbl": "inav"}
+
+
 @pytest.mark.parametrize("name", ["log.ulg", "log.bin", "log.bbl", "log.tlog", "log.bag", "log00"])
 def test_a_log_of_each_format_has_a_verdict_and_a_path(page, flown, tmp_path, name):
     assert page.upload(name, content_of(name, flown, tmp_path)).json() == {"name": name}
@@ -62,6 +69,23 @@ def test_a_log_of_each_format_has_a_verdict_and_a_path(page, flown, tmp_path, na
     assert look["explained"]
     assert look["end_s"] - look["start_s"] == pytest.approx(LASTS_S.get(name, 30.0), abs=2.0)
     assert len(look["path"]) > 20
+    assert look["autopilot"] == WRITTEN_BY.get(name, "")
+
+
+def test_identify_writes_the_parameters_of_the_logs_own_autopilot_or_of_the_chosen_one(tmp_path):
+    shelf = Shelf(tmp_path)
+    for name, look in (("a.fnr", {"autopilot": "inav"}), ("b.fnr", {"autopilot": ""}), ("c.fnr", None)):
+        (tmp_path / name).write_bytes(b"x")
+        if look is not None:
+            shelf.keep_look(tmp_path / name, look)
+
+    def whose(name: str, **asked: str) -> list[str]:
+        words = task_of("identify", {"files": [name], **asked}, shelf).words
+        return [word for before, word in pairwise(words) if before == "--for"]
+
+    assert whose("a.fnr") == whose("a.fnr", autopilot="") == ["inav"]
+    assert whose("a.fnr", autopilot="px4") == whose("b.fnr", autopilot="px4") == ["px4"]
+    assert whose("b.fnr") == whose("c.fnr") == []
 
 
 def test_a_folder_of_csv_files_is_looked_at(page, flown, tmp_path):
@@ -138,3 +162,26 @@ def test_a_campaign_has_a_cloud_and_goes_on_in_its_folder(page, folder):
     more = page.post("api/jobs", {**asked, "flights": 32, "folder": done["writes"]}).json()
     assert page.ended(more["number"])["facts"]["flights"] == 32
     assert page.file(done["writes"])["kind"] == "campaign"
+
+
+def test_the_time_of_a_certificate_counts_all_flights_that_certify_flies(page, folder):
+    """Those of the plan, 64 that are flown again, and the ranking, a sample of which has 64 for each input and more."""
+    small, large = (
+        page.post("api/requirement", {"scenario": "landing", "measure": "touchdown.rest_m", "at_most": 5.0,
+                                      "probability": share, "confidence": 0.9}).json()["name"]
+        for share in (0.8, 0.99)
+    )  # fmt: skip
+    paces = [page.post("api/ask", {"what": "pace", "requirement": name}).json() for name in (small, large)]
+    plans = [load_requirement(str(folder / name)).flights() for name in (small, large)]
+    assert paces[1]["flights"] - paces[0]["flights"] == plans[1] - plans[0] > 400
+    ranked = paces[0]["flights"] - plans[0] - 64
+    assert ranked % 64 == 0
+    assert ranked > 64 * 10
+    assert min(one["seconds"] for one in paces) >= 1
+
+
+@pytest.mark.parametrize("name", ["absent.toml", "../x.toml", "--x", "no_such"])
+def test_the_time_of_a_requirement_that_is_none_is_one_line(page, name):
+    answer = page.post("api/ask", {"what": "pace", "requirement": name})
+    assert answer.status_code == 400
+    assert "\n" not in answer.json()["error"]

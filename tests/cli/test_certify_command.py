@@ -30,15 +30,19 @@ def test_the_plan_is_told_and_nothing_is_flown(tmp_path):
         "requirements": [
             {
                 "requirement": "touchdown.horizontal_m at most 0.5 m with 90 % probability at 90 % confidence",
+                "words": "distance of the first contact from the pad's centre",
                 "needed": {"0": 22, "1": 38, "2": 52},
                 "allowed_failures": 2,
                 "flights": 52,
+                "allowed_of_all": 2,
             },
             {
                 "requirement": "no crash with 80 % probability at 90 % confidence",
+                "words": "1 where the flight crashed, else 0",
                 "needed": {"0": 11, "1": 18, "2": 25},
                 "allowed_failures": 2,
                 "flights": 25,
+                "allowed_of_all": 6,
             },
         ],
     }

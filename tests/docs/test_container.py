@@ -1,4 +1,4 @@
-"""The Dockerfile and the development container: their steps are those that work, run here without Docker's daemon."""
+"""The Dockerfile and the development container: built where Docker is at hand; their steps also run without it."""
 
 from __future__ import annotations
 
@@ -109,3 +109,31 @@ def test_the_images_steps_give_a_command_that_flies(tmp_path):
     assert (work / "sortie.html").is_file()
     assert "compil" not in run(shlex.join([*entry, *arguments, "--force", "2>&1"]).replace("'2>&1'", "2>&1"))
     assert Path(run("command -v flownav").strip()) == place / "bin" / "flownav"
+
+
+# -- with Docker -----------------------------------------------------------------------------------------------------
+IMAGE = "flownav-of-the-tests"
+
+
+def docker(*words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(["docker", *words], capture_output=True, text=True, check=False)
+
+
+@pytest.fixture
+def daemon() -> None:
+    if shutil.which("docker") is None or docker("info").returncode:
+        pytest.skip("Docker's daemon is not here: the tests above check the Dockerfile and run its steps without it")
+
+
+@pytest.mark.slow
+def test_docker_builds_the_image_which_flies_and_the_stage_of_the_development_container(daemon, tmp_path):
+    stage = docker("build", "--target", DEVELOP["build"]["target"], str(PROJECT))
+    assert stage.returncode == 0, stage.stderr
+    image = docker("build", "--tag", IMAGE, str(PROJECT))
+    assert image.returncode == 0, image.stderr
+    tmp_path.chmod(0o777)  # the image's user is another than the one who tests
+    flown = docker("run", "--rm", "--volume", f"{tmp_path}:/work", IMAGE)
+    docker("rmi", IMAGE)
+    assert flown.returncode == 0, flown.stderr
+    assert "verdict" in flown.stdout.lower()
+    assert (tmp_path / "sortie.fnr").is_file()

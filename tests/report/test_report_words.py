@@ -130,3 +130,25 @@ def test_the_last_frequency_is_not_cut_at_the_edge():
     sides = {text: side for side, text in re.findall(r'text-anchor="(\w+)">(\d+(?: Hz)?)</text>', panel.drawing.svg)}
     assert sides["50 Hz"] == "end"
     assert sides["45"] == "middle"
+
+
+def test_on_a_phone_the_spectrum_has_fewer_marks_and_keeps_its_largest_line():
+    frequency = np.linspace(0.0, 400.0, 2001)
+    values = np.where(np.arange(2001) == 1003, 100.0, 1.0).tolist()
+    found = {"frequency_hz": frequency.tolist()} | {key: values for key, _, _ in spectra.ROWS}
+    (panel,) = spectra.spectrum(Record({"vibration": found}))
+    wide, narrow = ElementTree.fromstring(f"<div>{panel.drawing.svg}</div>").findall("svg")
+    assert [one.get("class") for one in (wide, narrow)] == ["still on-wide", "still on-narrow"]
+    assert float(narrow.get("viewBox").split()[2]) < 400.0
+    marks = [
+        [one.text for one in view.iter("text") if re.fullmatch(r"\d+0( Hz)?", one.text)] for view in (wide, narrow)
+    ]
+    assert len(set(marks[1])) <= 5 < len(set(marks[0]))
+    for view, least in ((wide, 1000), (narrow, 380)):
+        lines = [np.array([list(map(float, pair.split(","))) for pair in one.get("points").split()])
+                 for one in view.iter("polyline")]  # fmt: skip
+        for line in lines:
+            assert least <= len(line) <= 2.0 * float(view.get("viewBox").split()[2])
+            highest = line[np.argmin(line[:, 1])]
+            share = (highest[0] - line[0, 0]) / (line[-1, 0] - line[0, 0])
+            assert share == pytest.approx(1003 / 2000, abs=0.003)

@@ -107,7 +107,7 @@ def certify(camera: Camera) -> None:
     camera.go("Certify")
     camera.page.get_by_label("Requirement").select_option("approach")
     camera.click("Plan")
-    camera.page.locator("main table").wait_for()
+    camera.page.get_by_text("To fly and judge takes about").wait_for()
     camera.take("certify")
 
 

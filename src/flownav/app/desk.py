@@ -7,10 +7,11 @@ from typing import Any
 from flownav.app.jobs import COMMAND, Jobs
 from flownav.app.shelf import CAMPAIGN as PLAN
 from flownav.app.shelf import LOOKED_AT, Shelf
+from flownav.app.tasks import word
 from flownav.app.warm import Warm
 from flownav.core.errors import InputError
 
-ASKED = ("cut", "fly", "cloud")
+ASKED = ("cut", "fly", "cloud", "pace")
 
 
 class Desk:
@@ -67,13 +68,16 @@ class Desk:
         self.look(name)
 
     async def ask(self, question: dict[str, Any]) -> dict[str, Any]:
-        """A question that is answered within a second: a GPS cut, a flight, a cloud of touchdowns."""
+        """A question that is answered within seconds: a GPS cut, a flight, touchdowns, a certificate's time."""
         if question.get("what") not in ASKED:
             raise InputError("no such question")
         if question["what"] == "cloud" and not (self.shelf.path_of(str(question.get("file"))) / PLAN).is_file():
             return {"flights": 0, "planned": 1, "landed": 0, "r95_m": None, "svg": "", "words": "is begun"}
         if "file" in question:
             question["path"] = str(self.shelf.existing(str(question["file"])))
+        if question["what"] == "pace":
+            asked = word(question.get("requirement"))
+            question["requirement"] = str(self.shelf.existing(asked)) if asked.endswith(".toml") else asked
         if question.get("sensor"):
             question["sensor"] = str(self.shelf.existing(str(question["sensor"])))
         return await self.bench.ask(question)

@@ -16,9 +16,11 @@ from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
 from flownav.scoring.path import columns_of
+from flownav.studies.explain.autopilot_settings import dialect_of
 from flownav.studies.inspection import summarise
 
 POINTS = 160  # of a thumbnail
+WRITTEN_BY = {".ulg": "px4", ".bin": "ardupilot"}  # formats of one autopilot, whose log may lack its parameters
 WORDS = ("explained", "verdict", "causes", "warnings", "obstacles", "replayable", "start_s", "end_s", "notes")
 
 
@@ -33,8 +35,10 @@ def look_at(path: str) -> dict[str, Any]:
     way, of = _way(log)
     sensors = [stream["sensor"] for stream in facts["streams"]]
     has_gps = Sensor.GPS_POSITION in log.streams
+    autopilot = dialect_of(log.parameters) or WRITTEN_BY.get(Path(path).suffix.lower(), "")
     return {name: facts[name] for name in WORDS} | {
-        "sensors": sensors, "has_gps": has_gps, "fed": bool(log.fed), "path": thinned(way, POINTS), "path_of": of,
+        "sensors": sensors, "has_gps": has_gps, "fed": bool(log.fed), "autopilot": autopilot,
+        "path": thinned(way, POINTS), "path_of": of,
     }  # fmt: skip
 
 

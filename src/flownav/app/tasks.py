@@ -67,10 +67,12 @@ def _explain(asked: Asked, shelf: Shelf) -> Task:
 
 
 def _identify(asked: Asked, shelf: Shelf) -> Task:
-    """A flow sensor's file from a log, and an autopilot's parameters."""
+    """A flow sensor's file from a log, and an autopilot's parameters: the log's own where none is chosen."""
     (name,) = _names(asked, shelf, 1)
+    own = (shelf.look_of(shelf.path_of(name)) or {}).get("autopilot")
+    whose = _autopilot({"autopilot": asked.get("autopilot") or own})
     out = f"{_stem(name)}-sensor.toml"
-    return Task(("identify", name, *_autopilot(asked), "--out", out), (name,), out)
+    return Task(("identify", name, *whose, "--out", out), (name,), out)
 
 
 def _compare(asked: Asked, shelf: Shelf) -> Task:

@@ -168,32 +168,33 @@ def _verify(folder: Path, requirement: str | None, again: int, key: Path | None,
 def _say_plan(asked: Requirement, as_json: bool) -> None:
     """How many flights each requirement needs, by the failures that it may have, and how many the file asks for."""
     from flownav.campaigns.certification.envelope import PLAN_FAILURES
-    from flownav.campaigns.requirement import needed_by
-
-    rows = [
-        {
-            "requirement": table.sentence(),
-            "needed": {str(failures): needed_by(table, failures) for failures in PLAN_FAILURES},
-            "allowed_failures": table.allowed_failures,
-            "flights": needed_by(table),
-        }
-        for table in asked.requirement
-    ]
-    plan = {"requirement": asked.name, "flights": asked.flights(), "requirements": rows}
-    words = f"{asked.name}: {asked.flights()} flights"
-    answer(plan, as_json, lambda: say(words, table_of(PLAN, rows, left=1), *_more_allowed(asked), wide=WIDE))
-
-
-def _more_allowed(asked: Requirement) -> list[str]:
-    """How many failures the requirements may have that need fewer flights than all, of which each is judged."""
+    from flownav.campaigns.measures import MEASURES
     from flownav.campaigns.requirement import needed_by
     from flownav.campaigns.tolerance import allowed
 
     flights = asked.flights()
-    return [
-        f"{table.sentence()}: of all {flights} flights {allowed(flights, table.probability, table.confidence)} may fail"
+    rows = [
+        {
+            "requirement": table.sentence(),
+            "words": MEASURES[table.measure].words,
+            "needed": {str(failures): needed_by(table, failures) for failures in PLAN_FAILURES},
+            "allowed_failures": table.allowed_failures,
+            "flights": needed_by(table),
+            "allowed_of_all": allowed(flights, table.probability, table.confidence),
+        }
         for table in asked.requirement
-        if needed_by(table) < flights
+    ]
+    plan = {"requirement": asked.name, "flights": flights, "requirements": rows}
+    words = f"{asked.name}: {flights} flights"
+    answer(plan, as_json, lambda: say(words, table_of(PLAN, rows, left=1), *_more_allowed(flights, rows), wide=WIDE))
+
+
+def _more_allowed(flights: int, rows: list[dict[str, Any]]) -> list[str]:
+    """How many failures the requirements may have that need fewer flights than all, of which each is judged."""
+    return [
+        f"{row['requirement']}: of all {flights} flights {row['allowed_of_all']} may fail"
+        for row in rows
+        if row["flights"] < flights
     ]
 
 

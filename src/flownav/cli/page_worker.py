@@ -54,7 +54,14 @@ def cloud(question: Question) -> Answer:
     return cloud_of(question["path"])
 
 
-ANSWERS: dict[str, Callable[[Question], Answer]] = {"look": look, "cut": cut, "fly": fly, "cloud": cloud}
+def pace(question: Question) -> Answer:
+    """How long a requirement's certificate takes here."""
+    from flownav.app.pacing import pace_of
+
+    return pace_of(question["requirement"])
+
+
+ANSWERS: dict[str, Callable[[Question], Answer]] = {"look": look, "cut": cut, "fly": fly, "cloud": cloud, "pace": pace}
 
 
 def answered(line: str) -> Answer:

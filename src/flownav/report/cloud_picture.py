@@ -10,7 +10,7 @@ from flownav.report.campaign_figures import CIRCLES, Touchdowns
 from flownav.report.landing import HIGH_PX, Picture, scale_bar, side_by_side, view
 from flownav.report.panels import metres
 
-VIEW_PX = 520
+VIEW_PX = 420
 DOTS = 1500  # as many are drawn at most, evenly from all
 BEYOND = 1.25  # of the largest ring is in sight close up
 

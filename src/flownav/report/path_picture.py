@@ -28,7 +28,7 @@ from flownav.report.landing import (
 from flownav.report.series import Track, Window, at, is_north_known, start_end_s
 from flownav.scoring.phases import Phase, phases_of
 
-MAP_PX, HEIGHT_PX = 440, 520
+MAP_PX, HEIGHT_PX = 430, 430
 MARGIN_PX = 24.0
 MAP_POINTS, HEIGHT_POINTS, FRAMES = 1500, 300, 72
 AROUND_S = 2.0  # on the ground, before and after what the dot flies

@@ -11,7 +11,8 @@ from flownav.report.panels import Panel, Still, listed, number
 from flownav.report.series import track
 from flownav.scoring.vibration import spectrum_of
 
-WIDE_PX, HIGH_PX, LEFT_PX, GAP_PX = 1080, 150, 58, 24
+WIDE_PX, NARROW_PX, HIGH_PX, LEFT_PX, GAP_PX = 1080, 380, 150, 58, 24  # narrow: on a phone
+MARK_PX = 90  # of frequency between two labels, at least
 LABEL_PX = 24  # from the edge, within which a label in the middle of its mark would be cut
 MOTION_HZ = 5.0  # of a vehicle that flies; what is faster is vibration
 ROWS = (("accel_m_s2_rt_hz", "accelerometer (m/s²/√Hz)", "m/s²"), ("gyro_deg_s_rt_hz", "gyro (°/s/√Hz)", "°/s"))
@@ -32,9 +33,12 @@ def spectrum(record: Record) -> list[Panel]:
         f"{MOTION_HZ:g} Hz, faster than the vehicle itself: {listed(peaks)}. A rotor's line stands at its turns "
         "a second, its blades' at a multiple."
     )
-    parts = [_row(k, title, frequency, values) for k, (title, _, values) in enumerate(rows)]
     high = len(rows) * (HIGH_PX + GAP_PX) + 4
-    svg = f'<svg class="still" viewBox="0 0 {WIDE_PX} {high}" aria-hidden="true">{"".join(parts)}</svg>'
+    svg = "".join(
+        f'<svg class="still {shown}" viewBox="0 0 {wide} {high}" aria-hidden="true">'
+        f"{''.join(_row(k, title, frequency, values, wide) for k, (title, _, values) in enumerate(rows))}</svg>"
+        for wide, shown in ((WIDE_PX, "on-wide"), (NARROW_PX, "on-narrow"))
+    )
     alt = f"Vibration of the IMU over frequency, to {frequency[-1]:.0f} Hz. {caption}"
     return [Panel("vibration-spectrum", "Vibration by frequency", caption, alt, Still(svg), wide=True)]
 
@@ -53,9 +57,9 @@ def _numbers(found: Mapping[str, Any], key: str) -> Array:
     return known
 
 
-def _row(place: int, title: str, frequency: Array, values: Array) -> str:
-    """One density, on a logarithmic scale of whole decades."""
-    top, right = place * (HIGH_PX + GAP_PX) + 20, WIDE_PX - 8
+def _row(place: int, title: str, frequency: Array, values: Array, wide_px: int) -> str:
+    """One density, on a logarithmic scale of whole decades: the largest value of each half pixel."""
+    top, right = place * (HIGH_PX + GAP_PX) + 20, wide_px - 8
     low, high = np.floor(np.log10(np.quantile(values, 0.02))), np.ceil(np.log10(values.max()))
     high = max(high, low + 1)
 
@@ -66,7 +70,7 @@ def _row(place: int, title: str, frequency: Array, values: Array) -> str:
         return top + HIGH_PX - 20 - (HIGH_PX - 20) * np.clip((np.log10(value) - low) / (high - low), 0.0, 1.0)
 
     def anchored(hz: float) -> str:
-        side = "end" if across(hz) > WIDE_PX - LABEL_PX else "middle"
+        side = "end" if across(hz) > wide_px - LABEL_PX else "middle"
         return f'text-anchor="{side}"'
 
     decades = "".join(
@@ -74,12 +78,16 @@ def _row(place: int, title: str, frequency: Array, values: Array) -> str:
         f'<text x="{LEFT_PX - 6}" y="{up(10.0**k) + 4:.1f}" text-anchor="end">{10.0**k:g}</text>'
         for k in np.arange(low, high + 1)
     )
-    step = next(one for one in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 10**9) if frequency[-1] / one <= 12)
+    step = next(
+        one for one in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 10**9) if frequency[-1] / one <= wide_px / MARK_PX
+    )
     marks = "".join(
         f'<line x1="{across(hz):.1f}" x2="{across(hz):.1f}" y1="{top}" y2="{up(10.0**low):.1f}"/>'
         f'<text x="{across(hz):.1f}" y="{up(10.0**low) + 16:.1f}" {anchored(hz)}>{number(float(hz), 0)}'
         f"{' Hz' if hz + step > frequency[-1] else ''}</text>"
         for hz in np.arange(0.0, frequency[-1], step)
     )
-    line = " ".join(f"{x:.1f},{y:.1f}" for x, y in zip(across(frequency), up(values), strict=True))
+    starts = np.arange(0, len(values), -(-len(values) // (2 * wide_px)))
+    largest = np.maximum.reduceat(values, starts)
+    line = " ".join(f"{x:.1f},{y:.1f}" for x, y in zip(across(frequency[starts]), up(largest), strict=True))
     return f'{decades}{marks}<text x="4" y="{top - 10}">{title}</text><polyline points="{line}"/>'

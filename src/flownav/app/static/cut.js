@@ -2,12 +2,13 @@
 
 import { follow, post, start, state } from "./ask.js";
 import { button, command, el, points, svg } from "./dom.js";
+import { scaleBar } from "./live_map.js";
 
-const WIDE = 1000, HIGH = 220, LEFT = 44, RIGHT = 8, TOP = 12, BOTTOM = 26;
+const HIGH = 220, LEFT = 44, RIGHT = 8, TOP = 12, BOTTOM = 26;
 const LEAST_S = 1;
 
 export function show(main, asked) {
-  let name = asked, cuts = [], answer = null, busy = false, again = false, drawing = null;
+  let name = asked, cuts = [], answer = null, busy = false, again = false, drawing = null, wide = 1000;
   const pick = el("select", { "aria-label": "Log", onchange: () => choose(pick.value) });
   const flow = el("input", { type: "checkbox", onchange: ask });
   flow.checked = true;
@@ -15,7 +16,7 @@ export function show(main, asked) {
   const delay = slider("GPS delay [s]", 0, 1, 0.02, 0.22);
   const from = numberField("from [s]"), to = numberField("to [s]");
   const status = el("p", { role: "status" });
-  const chart = svg("svg", { class: "chart drawn", viewBox: `0 0 ${WIDE} ${HIGH}`, role: "img",
+  const chart = svg("svg", { class: "chart drawn", viewBox: `0 0 ${wide} ${HIGH}`, role: "img",
     "aria-label": "Distance of the estimate from GPS over time; draw to cut GPS" });
   const map = el("div"), table = el("div", { class: "scroll" }), same = el("div");
 
@@ -26,14 +27,14 @@ export function show(main, asked) {
   }
   function numberField(title) {
     const input = el("input", { type: "number", step: "any", "aria-label": `Cut GPS ${title}` });
-    return { input, box: el("label", {}, title, " ", input) };
+    return { input, box: el("label", { class: "seconds" }, title, " ", input) };
   }
-  const place = (t) => LEFT + (WIDE - LEFT - RIGHT) * (t - answer.span_s[0]) / (answer.span_s[1] - answer.span_s[0]);
+  const place = (t) => LEFT + (wide - LEFT - RIGHT) * (t - answer.span_s[0]) / (answer.span_s[1] - answer.span_s[0]);
   const time = (event) => {
     const box = chart.getBoundingClientRect();
-    const x = (event.clientX - box.left) / box.width * WIDE;
+    const x = (event.clientX - box.left) / box.width * wide;
     const [t0, t1] = answer.span_s;
-    return Math.min(t1, Math.max(t0, t0 + (t1 - t0) * (x - LEFT) / (WIDE - LEFT - RIGHT)));
+    return Math.min(t1, Math.max(t0, t0 + (t1 - t0) * (x - LEFT) / (wide - LEFT - RIGHT)));
   };
   const question = () => ({
     what: "cut", file: name, cuts, flow: flow.checked, flow_scale: scale.map(({ input }) => Number(input.value)),
@@ -75,14 +76,17 @@ export function show(main, asked) {
     ask();
   }
 
+  // Drawn as wide as it stands, so that its words keep their size on a phone.
   function drawChart() {
+    wide = Math.max(240, Math.round(chart.getBoundingClientRect().width));
+    chart.setAttribute("viewBox", `0 0 ${wide} ${HIGH}`);
     const most = Math.max(1, ...answer.away.map(([, away]) => away));
     const down = (away) => HIGH - BOTTOM - (HIGH - TOP - BOTTOM) * away / most;
     const shown = drawing ? [...cuts, [Math.min(...drawing), Math.max(...drawing)]] : cuts;
     const ticks = [0, 0.25, 0.5, 0.75, 1].map((part) => answer.span_s[0] + part * (answer.span_s[1] - answer.span_s[0]));
     chart.replaceChildren(
       ...shown.map(([a, b]) => svg("rect", { class: "cut", x: place(a), y: TOP, width: Math.max(1, place(b) - place(a)), height: HIGH - TOP - BOTTOM })),
-      svg("line", { x1: LEFT, x2: WIDE - RIGHT, y1: down(0), y2: down(0) }),
+      svg("line", { x1: LEFT, x2: wide - RIGHT, y1: down(0), y2: down(0) }),
       svg("text", { x: 4, y: TOP + 10 }, `${most.toFixed(1)} m`), svg("text", { x: 4, y: down(0) }, "0"),
       ...ticks.map((t, k) => svg("text", { x: place(t), y: HIGH - 8, "text-anchor": ["start", "middle", "middle", "middle", "end"][k] }, `${Math.round(t) + 0} s`)),
       svg("polyline", { class: "estimate", points: points(answer.away, ([t, away]) => [place(t), down(away)]) }));
@@ -95,10 +99,10 @@ export function show(main, asked) {
     const [n0, n1, e0, e1] = [Math.min(...n), Math.max(...n), Math.min(...e), Math.max(...e)];
     const size = 420, scaled = (size - 40) / Math.max(n1 - n0, e1 - e0, 1);
     const at = ([north, east]) => [size / 2 + scaled * (east - (e0 + e1) / 2), size / 2 - scaled * (north - (n0 + n1) / 2)];
-    return map.replaceChildren(el("figure", { class: "picture" },
+    return map.replaceChildren(el("figure", { class: "picture of-map" },
       svg("svg", { class: "chart map", viewBox: `0 0 ${size} ${size}`, role: "img", "aria-label": "The paths from above, north up" },
         svg("polyline", { class: "gps", points: points(answer.gps, at) }),
-        svg("polyline", { class: "estimate", points: points(answer.path, at) })),
+        svg("polyline", { class: "estimate", points: points(answer.path, at) }), scaleBar(scaled)),
       el("figcaption", {}, "From above, north up: ", el("span", { class: "of-estimate" }, "the estimate"), " over ", el("span", { class: "of-gps" }, "GPS"), ".")));
   }
 
@@ -145,7 +149,9 @@ export function show(main, asked) {
     el("p", { class: "actions" }, from.box, to.box, add, button("Undo all", () => setCuts([]))), table,
     el("div", { class: "sliders" }, el("label", {}, flow, " Fuse the optical flow"), scale.map(({ box }) => box), delay.box), map, same);
 
-  return follow(({ files }) => {
+  const sized = new ResizeObserver(() => { if (answer) drawChart(); });
+  sized.observe(chart);
+  const unfollow = follow(({ files }) => {
     const able = files.filter((file) => file.look && file.look.replayable && file.look.has_gps).map((file) => file.name);
     if (able.join("/") !== [...pick.options].map((option) => option.value).join("/")) {
       pick.replaceChildren(...able.map((each) => el("option", { value: each }, each)));
@@ -155,4 +161,5 @@ export function show(main, asked) {
     else if (able.length && !answer && !busy && !status.textContent) choose(name);
     pick.value = name;
   });
+  return () => { sized.disconnect(); unfollow(); };
 }

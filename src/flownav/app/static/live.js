@@ -94,7 +94,7 @@ const field = (value, min, max, step) => el("input", { type: "number", value, mi
 // -- a session ----------------------------------------------------------------------------------------------------
 function sessionCard() {
   const alarm = el("p", { role: "alert" }), since = el("p", { class: "fine" }), stop = el("p", { class: "actions" });
-  const tiles = el("dl", { class: "tiles" }), map = el("figure", { class: "picture" }), sensors = el("div", { class: "scroll" });
+  const tiles = el("dl", { class: "tiles" }), map = el("figure", { class: "picture of-map" }), sensors = el("div", { class: "scroll" });
   const more = el("details", {}, el("summary", {}, "More figures")), lines = el("ul", { class: "plain fine" }), title = el("h2");
   more.append(sensors, lines);
   const node = el("section", { class: "session", "aria-label": "Live session" }, title, alarm, since, stop, tiles, map, more);

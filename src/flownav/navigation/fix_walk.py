@@ -14,12 +14,11 @@ from flownav.core.compile import Lanes, Work, equation, larger, replacing, row_o
 from flownav.estimation.states import GPS_VELOCITY, STATE
 from flownav.navigation import calls
 from flownav.navigation.flow_noise import AGREEMENT_S, alike
-from flownav.navigation.kernel_settings import GpsSettings
 from flownav.navigation.memory import MEMORY
-from flownav.navigation.reasons import FUSED, INNOVATION_GATE
+from flownav.navigation.reasons import FUSED
 from flownav.navigation.records import FlowMemory, GpsMemory, LevelMemory, WitnessMemory
 from flownav.navigation.trust import OF_GPS
-from flownav.navigation.verdicts import Reset, Tested, on_lanes
+from flownav.navigation.verdicts import Tested, on_lanes
 
 MOMENT_S = 1.5  # chosen: seven fixes of 5 Hz, in which flow and accelerometer cannot lose the way
 SOUND_M_S = 0.6  # sound receivers part from their own velocity by 0.56 m/s at most, over 10 s (integrity.md)
@@ -63,22 +62,15 @@ def contradicted(innovation: float, own: OwnVelocity, flow: FlowMemory, t_s: flo
     return flowed and agrees and own.error_m_s * innovation <= 0.0
 
 
-class Walk(NamedTuple):
-    """The memory after a place; of one that walked out of its gate, what it taught of its velocity is forgotten."""
-
-    gps: GpsMemory
-    forgotten: Reset
-
-
 @on_lanes(calls.watch_walk)
 def watch_walk(
     tested: Tested, own: OwnVelocity, flow: FlowMemory, before: WitnessMemory, level: LevelMemory, m: GpsMemory,
-    *, t_s: float, axis: int, s: GpsSettings,
-) -> Walk:  # fmt: skip
+    *, t_s: float, axis: int,
+) -> GpsMemory:  # fmt: skip
     """After the test of a place along north (0) or east (1): how alike innovations that are fused are, on average over
-    AGREEMENT_S, while the velocities contradict them; and whether one that was held back has left its gate.
+    AGREEMENT_S, while the velocities contradict them.
     """
-    step_s = larger(t_s - before.received_s, 0.0)
+    step_s = t_s - before.received_s
     parted_m = abs(tested.innovation) * (1.0 - tested.variance / tested.total)  # what the states take of it
     counts = contradicted(tested.innovation, own, flow, t_s, before.fused_s) and parted_m > SOUND_M_S * step_s
     product = alike(tested.innovation, before.before, tested.total) if counts else 0.0
@@ -86,17 +78,12 @@ def watch_walk(
     now = was + smaller(step_s / AGREEMENT_S, 1.0) * (product - was) if tested.reason == FUSED else was
     found = now > ONE_ERROR
     kept = 0.0 if found else now
-    left = t_s - m.walked_s <= LONGEST_S and level.ratio > HELD_RATIO and tested.reason == INNOVATION_GATE
-    walked_s = -np.inf if left and axis == 1 else m.walked_s
-    return Walk(
-        with_walk(
-            m,
-            alike_n=kept if axis == 0 else m.alike_n,
-            alike_e=m.alike_e if axis == 0 else kept,
-            walked_s=t_s if found else walked_s,
-            walked_ratio=level.ratio if found else m.walked_ratio,
-        ),
-        Reset(GPS_VELOCITY + axis if left else -1, 0.0, s.gps_velocity_sigma_m_s * s.gps_velocity_sigma_m_s),
+    return with_walk(
+        m,
+        alike_n=kept if axis == 0 else m.alike_n,
+        alike_e=m.alike_e if axis == 0 else kept,
+        walked_s=t_s if found else m.walked_s,
+        walked_ratio=level.ratio if found else m.walked_ratio,
     )
 
 

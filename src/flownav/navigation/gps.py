@@ -309,7 +309,7 @@ def take_gps(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Outp
             add_lag(work, lanes, s)
         conclude(work, lanes, t_s, sensor, axis, s.gate_sigma, o)
         if position and axis < 2:
-            watch_walk(work, lanes, t_s, axis, s, place=OF_GPS + axis, o=o)
+            watch_walk(work, lanes, t_s, axis, place=OF_GPS + axis)
         follow_fix_noise(work, lanes, t_s, OF_GPS + state, s)
         if axis < 2:
             note_aid(work, lanes, t_s, o)

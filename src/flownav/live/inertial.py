@@ -37,6 +37,9 @@ AGREED_S = 1.0  # likewise, where another serves: chosen
 HIGHER_M = 0.4  # a height that is higher or lower than expected by this, or is refused, is a witness: chosen
 TOGETHER_S = 0.5  # two that report so within this agree: chosen
 DOUBTED_S = 1.0  # for this long after they reported it: chosen
+Box = tuple[float, float, float, float, float, float]
+EMPTY: Box = (math.inf, math.inf, math.inf, -math.inf, -math.inf, -math.inf)  # holds nothing: low, high of three axes
+NEARLY = 0.999999  # of a square: beyond the last digits that a sum of squares loses
 UP = {(Sensor.RANGE, 0): 1.0, (Sensor.BARO, 0): 1.0, (Sensor.GPS_POSITION, 2): -1.0}  # sign of an innovation, up
 
 
@@ -56,11 +59,43 @@ class Usual(NamedTuple):
     by_chance: float
 
 
+class _Span:
+    """A box that holds every force of the last KEPT_S, and of at most KEPT_S more: of two spells, the later unended."""
+
+    def __init__(self) -> None:
+        self._since_s = math.nan
+        self._now: Box = EMPTY
+        self._before: Box = EMPTY
+
+    def take(self, t_s: float, x: float, y: float, z: float) -> None:
+        """A force at an instant."""
+        if not t_s - self._since_s < KEPT_S:
+            self._since_s, self._before, self._now = t_s, self._now, EMPTY
+        a, b, c, d, e, f = self._now
+        self._now = min(a, x), min(b, y), min(c, z), max(d, x), max(e, y), max(f, z)
+
+    @property
+    def box(self) -> Box:
+        """Low and high along the three axes."""
+        a, b, c, d, e, f = self._now
+        g, h, i, j, k, m = self._before
+        return min(a, g), min(b, h), min(c, i), max(d, j), max(e, k), max(f, m)
+
+
+def are_near(one: Box, other: Box) -> bool:
+    """Whether no force of one box, and so no median of some of them, can be apart from one of another."""
+    square = 0.0
+    for axis in range(3):
+        square += max(other[axis + 3] - one[axis], one[axis + 3] - other[axis]) ** 2
+    return square < NEARLY * APART_M_S2**2
+
+
 class _SourceHistory:
     """The recent readings of one source, and since when its accelerometer has repeated one value."""
 
     def __init__(self) -> None:
         self.kept: deque[Sample] = deque(maxlen=MOST_KEPT)
+        self._span = _Span()
         self.same_since_s = math.nan
         self.erred_s = -math.inf  # when it was stuck or contradicted last
         self.alike = 0
@@ -73,6 +108,7 @@ class _SourceHistory:
         while self.kept[0].t_s < sample.t_s - KEPT_S:
             self.kept.popleft()
         value = sample.reading.value
+        self._span.take(sample.t_s, *value[3:6])
         if before is None or value[3:] != before.reading.value[3:]:
             self.jumped = self._jumps(sample, before)
             self.same_since_s, self.alike, self.gyro_moved = sample.t_s, 1, False
@@ -89,6 +125,9 @@ class _SourceHistory:
         near = before is not None and math.dist(before.reading.value[3:6], force) <= FLICKER_M_S2
         if near and self.jumped and sample.t_s - self.erred_s < RECOVERED_S:
             return True
+        x, y, z = force
+        if are_near(self.box, (x, y, z, x, y, z)):
+            return False
         columns = self._lately(sample.t_s - BEFORE_S)
         if columns is None or math.dist(map(median, columns), force) <= APART_M_S2:
             return False
@@ -100,6 +139,11 @@ class _SourceHistory:
         """Whether its accelerometer is stuck."""
         newest_s = self.kept[-1].t_s if self.kept else math.nan
         return self.jumped and self.gyro_moved and self.alike >= LEAST_STUCK and newest_s - self.same_since_s >= STUCK_S
+
+    @property
+    def box(self) -> Box:
+        """The box of its forces of the last KEPT_S."""
+        return self._span.box
 
     def usual(self, t_s: float) -> Usual | None:
         """Medians over the LOOK_S before an instant; None where there are too few readings."""
@@ -192,8 +236,10 @@ class Inertial:
 
     def _contradicted(self, serves: Source, t_s: float, barred: Collection[Source]) -> bool:
         """Whether the source in use contradicts all others, or, of two, measures gravity less well than the other."""
-        alive = self._alive(serves, t_s, barred)
-        own = self._histories[serves].usual(t_s) if alive else None
+        alive, box = self._alive(serves, t_s, barred), self._histories[serves].box
+        if all(are_near(box, history.box) for history in alive):
+            return False
+        own = self._histories[serves].usual(t_s)
         if own is None:
             return False
         others = [other for other in (history.usual(t_s) for history in alive) if other is not None]

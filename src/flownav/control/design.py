@@ -7,8 +7,8 @@ bandwidth; whether they hold on it is printed by `flownav vehicle FILE --margins
 
 A multirotor's horizontal axes are where that search (its measure and margins) ended on the roll axis of the shipped 450
 mm quad with the inflow held, too; the velocity's integral was then lowered by hand until the loops of both shipped
-multirotors keep 45 degrees; both axes have the same. A share of the rotors' thrust gives the body an angular acceleration,
-where a cyclic gives it a rate.
+multirotors keep 45 degrees; both axes have the same. A share of the rotors' thrust gives the body an angular
+acceleration, where a cyclic gives it a rate.
 """
 
 import math

@@ -38,7 +38,9 @@ class Searched(NamedTuple):
 
 
 class Law(NamedTuple):
-    """Name, bounds of its numbers, its paths, and the plant with what it feeds back inside the attitude loop."""
+    """Name, bounds of its numbers, its paths, the plant with what it feeds back inside the attitude loop, its numbers
+    as a shape, and of a shape and a stiffness [1/s2] the numbers from which it is searched.
+    """
 
     name: str
     least: Searched
@@ -46,6 +48,7 @@ class Law(NamedTuple):
     paths: Callable[[Searched, Axis, NominalModel], Paths]
     inside: Callable[[Searched, str, LinearPlant, NominalModel], LinearPlant]
     shape: Callable[[Searched, str, NominalModel], Shape]
+    start: Callable[[Shape, float], Searched]
 
 
 OUTER_LEAST, OUTER_MOST = (0.3, 0.3, 0.05, 0.03), (6.0, 2.0, 3.0, 1.0)
@@ -74,6 +77,17 @@ def pid_shape(numbers: Searched, name: str, stated: NominalModel) -> Shape:
 def without_shape(numbers: Searched, name: str, stated: NominalModel) -> Shape:
     """The shipped law's with its observer off."""
     return pid_shape(numbers, name, stated)._replace(gust_s=OFF_S)
+
+
+def pid_start(shape: Shape, stiffness_1_s2: float) -> Searched:
+    """The designed shape, and little of what is the law's own."""
+    return Searched(*shape, 0.05, 0.05)
+
+
+def indi_start(shape: Shape, stiffness_1_s2: float) -> Searched:
+    """INDI with the designed shape's gains, its model's G and a filter of 25 rad/s."""
+    rate = shape.damping_s * stiffness_1_s2
+    return Searched(rate, shape.attitude / shape.damping_s, 1.0, *shape[3:], 25.0, 1.0)
 
 
 def pid_paths(numbers: Searched, axis: Axis, stated: NominalModel) -> Paths:
@@ -201,11 +215,11 @@ def indi_inside(numbers: Searched, name: str, plant: LinearPlant, stated: Nomina
 
 LAWS = (
     Law("observer (shipped)", Searched(*PID_LEAST, *OUTER_LEAST, *UNUSED), Searched(*PID_MOST, *OUTER_MOST, *UNUSED),
-        pid_paths, as_it_is, pid_shape),
+        pid_paths, as_it_is, pid_shape, pid_start),
     Law("without the observer", Searched(*PID_LEAST, *OUTER_LEAST[:3], *(1.0, 1.0, 1.0)),
-        Searched(*PID_MOST, *OUTER_MOST[:3], *(1.0, 1.0, 1.0)), without_paths, as_it_is, without_shape),
+        Searched(*PID_MOST, *OUTER_MOST[:3], *(1.0, 1.0, 1.0)), without_paths, as_it_is, without_shape, pid_start),
     Law("observer, wind state", Searched(*PID_LEAST, *OUTER_LEAST, 0.01, 0.004),
-        Searched(*PID_MOST, *OUTER_MOST, 0.95, 0.5), wind_paths, wind_inside, pid_shape),
+        Searched(*PID_MOST, *OUTER_MOST, 0.95, 0.5), wind_paths, wind_inside, pid_shape, pid_start),
     Law("observer, INDI", Searched(1.0, 0.3, 0.1, *OUTER_LEAST, 4.0, 1.0),
-        Searched(25.0, 15.0, 4.0, *OUTER_MOST, 150.0, 1.0), indi_paths, indi_inside, indi_shape),
+        Searched(25.0, 15.0, 4.0, *OUTER_MOST, 150.0, 1.0), indi_paths, indi_inside, indi_shape, indi_start),
 )  # fmt: skip

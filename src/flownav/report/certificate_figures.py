@@ -152,7 +152,6 @@ def envelope(facts: Mapping[str, Any]) -> Panel:
         data.append(_fields(axes, inside, words, COLOUR[role], polar))
     look = layout(470)
     if polar:
-        look["margin"] = look["margin"] | {"r": 32}  # "90°" stands right of the circle
         look["polar"] = {
             "bgcolor": "rgba(0,0,0,0)",
             "angularaxis": {"rotation": 90, "direction": "clockwise", "ticksuffix": "°", "gridcolor": COLOUR["rule"],

@@ -58,7 +58,7 @@ def content_of(name: str, flown, tmp_path: Path) -> bytes:
     return (tmp_path / "x.fnr").read_bytes()
 
 
-WRITTEN_BY = {"log.ulg": "px4", "log.bin": "ardupilot", "log.bbl": "inav"}
+WRITTEN_BY = {"log.ulg": "px4", "log.bin": "ardupilot"}
 
 
 @pytest.mark.parametrize("name", ["log.ulg", "log.bin", "log.bbl", "log.tlog", "log.bag", "log00"])

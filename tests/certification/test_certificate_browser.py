@@ -1,15 +1,19 @@
-"""The certificate in a real browser: figures drawn, nothing loaded, phone, dark, and paper to be signed."""
+"""A certificate and a campaign in a real browser: figures drawn, nothing loaded, phone, dark, paper to be signed."""
 
 from __future__ import annotations
 
 import pytest
 
 from browsing import Visit
+from flownav.api.campaign import Campaign
 from flownav.campaigns.certification.cells import plan_of
 from flownav.campaigns.certification.certify import certify, with_ranking
 from flownav.campaigns.certification.written import write_certificate
 from flownav.campaigns.requirement import load_requirement
-from flownav.campaigns.store import Store
+from flownav.campaigns.store import Dataset, Store
+from flownav.campaigns.summary import summary_of
+from flownav.report.style import PALETTE
+from page_looks import complaints, ground_of, rgb
 from requirements import ASKED, HEAD, WINDY, StandIn, write
 
 pytestmark = pytest.mark.browser
@@ -24,7 +28,8 @@ def far_in_wind(cell, seed, first, flights):
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory):
+def pages(tmp_path_factory):
+    """The pages of a certificate and of the campaign that its flights are."""
     folder, engine = tmp_path_factory.mktemp("certificate"), StandIn(far_in_wind)
     path = write(folder, HEAD + WINDY + "height_m = [2, 4]\n" + ASKED + CRASH)
     asked = load_requirement(path)
@@ -32,7 +37,13 @@ def page(tmp_path_factory):
     with Store(folder / "out").opened(plan) as store:
         certificate = with_ranking(certify(asked, plan, engine, store), engine, store.folder, 16)
         write_certificate(certificate, store, path, 0)
-    return folder / "out" / "certificate.html"
+    campaign = Campaign(plan, folder / "out", summary_of(plan, Dataset(folder / "out")))
+    return {"certificate": folder / "out" / "certificate.html", "campaign": campaign.report(folder / "campaign.html")}
+
+
+@pytest.fixture
+def page(pages):
+    return pages["certificate"]
 
 
 def test_every_figure_is_drawn_and_the_verdict_is_said(browser, page):
@@ -62,4 +73,26 @@ def test_paper_has_places_to_sign_and_no_trees(browser, page):
     assert {figure["ink"] for figure in visit.figures().values()} == {"#1d232a"}
     assert visit.page.evaluate("document.querySelectorAll('.signature').length") == 3
     assert visit.page.evaluate("getComputedStyle(document.querySelector('.on-screen')).display") == "none"
+    visit.context.close()
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(390, "light"), (390, "dark"), (1600, "dark")])
+@pytest.mark.parametrize("name", ["certificate", "campaign"])
+def test_a_page_is_whole_readable_and_small_enough_to_be_sent(browser, pages, name, width, scheme):
+    visit = Visit(browser, pages[name], width=width, color_scheme=scheme)
+    assert complaints(visit.page) == []
+    assert ground_of(visit.page) == rgb(PALETTE["page"][scheme == "dark"])
+    assert visit.errors == []
+    assert pages[name].stat().st_size <= 2.2e6
+    visit.context.close()
+
+
+@pytest.mark.parametrize("name", ["certificate", "campaign"])
+def test_tables_are_whole_on_paper(browser, pages, name):
+    visit = Visit(browser, pages[name], width=688)  # A4 less its margins
+    visit.page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    visit.page.emulate_media(media="print")
+    visit.paint()
+    wide = "[...document.querySelectorAll('table')].filter((one) => one.getBoundingClientRect().right > 689).length"
+    assert visit.page.evaluate(wide) == 0
     visit.context.close()

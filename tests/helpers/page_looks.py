@@ -45,6 +45,10 @@ COMPLAINTS = """([smallest, palest]) => {
     const drawn = node.ownerSVGElement;
     if (!scrolls(node) && (box.right > wide + 1 || box.left < -1)) found.push(`out of the window: ${words}`);
     if (!own) continue;
+    let outer = drawn;
+    while (outer?.ownerSVGElement) outer = outer.ownerSVGElement;
+    const picture = outer?.getBoundingClientRect();
+    if (picture && (box.left < picture.left - 2 || box.right > picture.right + 2)) found.push(`cut: ${words}`);
     if (!drawn && node.scrollWidth > node.clientWidth + 1 && style.overflowX === "hidden") found.push(`cut: ${words}`);
     const matrix = drawn ? node.getScreenCTM() : { c: 0, d: 1 };
     const size = parseFloat(style.fontSize) * Math.hypot(matrix.c, matrix.d);

@@ -24,7 +24,7 @@ PICTURES = Path(__file__).parents[2] / "docs" / "pictures"
 WIDTH = 1000  # of the tutorial's pictures [px]
 HEIGHTS = {390: 844, 1600: 1000}
 PATIENCE_MS = 300_000
-COLOURS = 128
+COLOURS, ROUNDS = 192, 4  # of a picture; of the search for them, so that small red marks stay red
 FLOWNAV = (sys.executable, "-m", "flownav")
 PORT = 14550  # of the simulated vehicle
 
@@ -62,7 +62,7 @@ class Camera:
         self.page.evaluate(hide, "none")
         shot = self.page.locator("body").screenshot(animations="disabled")
         self.page.evaluate(hide, "")
-        picture = Image.open(io.BytesIO(shot)).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+        picture = Image.open(io.BytesIO(shot)).convert("RGB").quantize(COLOURS, kmeans=ROUNDS, dither=Image.Dither.NONE)
         picture.save(self.folder / f"app-{name}.png", optimize=True)
 
 

@@ -206,7 +206,7 @@ def sensitivity(key: str, cell: dict[str, Any]) -> Panel | None:
         "hovertemplate": "%{x:.2f}<extra></extra>",
     }  # fmt: skip
     look = layout(90 + 26 * len(known_rows)) | {"hovermode": "closest"}
-    look["xaxis"] = axis("rank correlation") | {"tickangle": 0, "nticks": 4}  # a phone has room for no more
+    look["xaxis"] = axis("correlation") | {"tickangle": 0, "nticks": 4}  # a phone has room for no more
     look["yaxis"] = axis() | {"automargin": True, "nticks": len(known_rows)}
     words = (
         "The twelve strongest of Spearman's rank correlations with how far off it touched, with 95 % intervals; grey: "

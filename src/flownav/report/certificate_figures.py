@@ -1,6 +1,7 @@
 """The figures of a certificate: touchdowns, the tail of each measure, the envelope, inputs ranked, the split."""
 
 from collections.abc import Mapping, Sequence
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ KNOWN_WORDS = {
 }
 MOST_DOTS = 4000
 MOST_BARS = 12
+LINE_LETTERS = 42  # of an axis's title: a longer one would be cut off on a phone
 LEAST_JOINT_INDEX = 2.0  # sum of total indices, beyond which inputs act mostly together
 # what a field of the envelope is: its words, its colour's role, and which fields are so
 FIELDS = (
@@ -117,7 +119,7 @@ def tail(one: Mapping[str, Any], figures: Array) -> Panel:
         data.append({"type": "scatter", "x": at_x, "y": at_y, "mode": "lines", "name": name, "hoverinfo": "skip",
                      "line": {"color": COLOUR[role], "width": 1.5, "dash": dash}})  # fmt: skip
     scale = axis("share of flights beyond") | {"type": "log", "tickformat": "~p", "dtick": 1, "nticks": 0}
-    across = axis(one["words"] + (f" ({one['unit']})" if one["unit"] else ""))
+    across = axis("<br>".join(wrap(one["words"] + (f" ({one['unit']})" if one["unit"] else ""), LINE_LETTERS)))
     if float(finite.min()) >= 0.0:
         across["range"] = [0.0, 1.1 * _far(finite, [limit] if bound is None else [limit, bound])]
     look = layout(430) | {"xaxis": across, "yaxis": scale, "hovermode": "closest"}
@@ -262,6 +264,6 @@ def _bars(rows: Sequence[Mapping[str, Any]], height_px: int) -> Drawing:
                      "name": which, "marker": {"color": COLOUR[role]}, "error_x": bars,
                      "hovertemplate": "%{y}: " + which + " %{x:.3f}<extra></extra>"})  # fmt: skip
     look = layout(height_px) | {"barmode": "group", "bargap": 0.35, "bargroupgap": 0.08, "hovermode": "closest"}
-    look["xaxis"] = axis("share of the outcome's variance") | {"rangemode": "tozero"}
+    look["xaxis"] = axis("share of the<br>outcome's variance") | {"rangemode": "tozero"}
     look["yaxis"] = axis() | {"autorange": "reversed", "automargin": True, "nticks": 0, "ticks": ""}
     return drawing(data, look)

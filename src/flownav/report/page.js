@@ -30,7 +30,8 @@
     const width_px = names.reduce((sum, name) => sum + 52 + 7 * name.length, 0);
     const legend_px = 22 * Math.ceil((1.15 * width_px) / (plot.clientWidth - 60));
     const axes_px = layout.height - layout.margin.t - layout.margin.b;
-    Object.assign(layout.margin, { l: 54, r: 6, t: 34, b: 46 + legend_px });
+    // "90°" stands right of a wind's circle
+    Object.assign(layout.margin, { l: layout.polar ? 36 : 54, r: layout.polar ? 36 : 6, t: 34, b: 46 + legend_px });
     Object.assign(layout.legend, { y: -46 / axes_px, yanchor: "top" });
     layout.height = axes_px + layout.margin.t + layout.margin.b;
   }

@@ -55,7 +55,7 @@ export function show(main) {
     if (!job) return;
     const facts = job.facts;
     if (!facts) { plan.replaceChildren(el("p", {}, job.message || "is planned ...")); return; }
-    plan.replaceChildren(el("p", {}, `${facts.flights} flights show it.`), el("table", {},
+    plan.replaceChildren(el("p", {}, `${facts.flights} flights are needed.`), el("table", {},
       el("thead", {}, el("tr", {}, ["requirement", `may fail, of ${facts.flights}`].map((text) => el("th", { scope: "col" }, text)))),
       el("tbody", {}, facts.requirements.map((row) => el("tr", {}, el("td", {}, inWords(row.requirement, row.words)),
         el("td", {}, String(row.allowed_of_all)))))), pace, command(job.command));

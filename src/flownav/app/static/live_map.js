@@ -49,7 +49,7 @@ export function whole(now) {
   const drawing = svg("svg", { class: "chart map", viewBox: `0 0 ${SIZE} ${SIZE}`, role: "img", "aria-label": `The path from above, north up; the vehicle is ${here[0].toFixed(1)} m north and ${here[1].toFixed(1)} m east of the start` },
     shown > 0 && svg("circle", { class: "level", cx: x, cy: y, r: Math.max(1, scale * shown) }),
     pad && svg("rect", { class: "pad", x: pad[0] - 6, y: pad[1] - 6, width: 12, height: 12 }),
-    pad && svg("text", { x: pad[0] + 10, y: pad[1] + 4 }, "pad"),
+    pad && svg("text", pad[0] > SIZE - 2 * MARGIN ? { x: pad[0] - 10, y: pad[1] + 4, "text-anchor": "end" } : { x: pad[0] + 10, y: pad[1] + 4 }, "pad"),
     runs(now.path).map((run) => svg("polyline", { class: run.sent ? "estimate" : "withheld", points: points(run.points, at) })),
     svg("circle", { class: now.reason ? "place withheld" : "place", cx: x, cy: y, r: 6 }),
     scaleBar(scale),

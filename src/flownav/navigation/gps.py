@@ -13,6 +13,7 @@ from flownav.estimation.laws.still import pad_below
 from flownav.estimation.states import GPS_FAST, GPS_SLOW, GPS_VELOCITY, PAD, POSITION, STATE, VELOCITY
 from flownav.navigation import calls
 from flownav.navigation.fault_signs import sign_drift
+from flownav.navigation.fix_walk import MOMENT_S, hold_walk, watch_walk
 from flownav.navigation.kernel_settings import GpsSettings
 from flownav.navigation.memory import MEMORY
 from flownav.navigation.motion_records import SteadyForce
@@ -47,7 +48,6 @@ SOON_S = 1.0  # with 7 s a flow of the wrong sign carried the vehicle 84 m off, 
 # chosen: flow drifts by less than 1 m in it (measured.md), and a receiver that is off for so long is not the better one
 JUMPED_S = 60.0
 LEAPT_RATIO = 4.0  # twice the gate: chosen; what a flow of the wrong sign leads away creeps out of it
-MOMENT_S = 1.5  # chosen: seven fixes of 5 Hz, in which flow and accelerometer cannot lose the way
 LEAST_PAD_VARIANCE_M2 = 1e-6  # chosen: 1 mm, so that a tie is never exact
 
 with_fused = replacing(WitnessMemory, "fused_s")
@@ -297,6 +297,8 @@ def take_gps(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Outp
             add_lag(work, lanes, s)
         expect(work, lanes, states_of(lanes), True)
         compare_level(work, lanes, axis, s.gate_sigma)
+    if position:
+        hold_walk(work, lanes, t_s)
     for axis in range(3):
         state = axis if position else 3 + axis
         offer_axis(work, lanes, axis, position, False, s)
@@ -306,6 +308,8 @@ def take_gps(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Outp
         else:
             add_lag(work, lanes, s)
         conclude(work, lanes, t_s, sensor, axis, s.gate_sigma, o)
+        if position and axis < 2:
+            watch_walk(work, lanes, t_s, axis, place=OF_GPS + axis)
         follow_fix_noise(work, lanes, t_s, OF_GPS + state, s)
         if axis < 2:
             note_aid(work, lanes, t_s, o)

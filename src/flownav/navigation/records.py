@@ -236,13 +236,19 @@ class LevelMemory(NamedTuple):
 
 
 class GpsMemory(NamedTuple):
-    """told_s: when GPS last measured north or east; moved_n_m and moved_e_m: how far resets to GPS moved the position,
-    back and forth added up.
+    """last_fix_s: when GPS last measured north or east; moved_n_m and moved_e_m: how far resets to GPS moved the
+    position, back and forth added up. alike_n and alike_e: how alike the innovations of its position are while flow and
+    its own velocity contradict them; walked_s: when it was last found to walk off, and
+    walked_ratio: its test ratio then.
     """
 
     last_fix_s: float = -inf
     moved_n_m: float = 0.0
     moved_e_m: float = 0.0
+    alike_n: float = 0.0
+    alike_e: float = 0.0
+    walked_s: float = -inf
+    walked_ratio: float = 0.0
 
 
 class PadMemory(NamedTuple):

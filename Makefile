@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 unexport PYTHONDONTWRITEBYTECODE  # the tests start Python hundreds of times: what it made of NumPy and Numba is kept
 INSTALL := $(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test test-real-time test-random test-gpu test-slow long-log fuzz mutants league made-flights explain integrity witnesses rare validate weigh onboard figures digests pairs report-size install-size schemas lint bench bench-once docs pictures tutorials wheel wheel-test clean
+.PHONY: demo test test-real-time test-random test-gpu test-slow long-log fuzz mutants league made-flights explain envelope integrity witnesses rare validate weigh onboard figures digests pairs report-size install-size schemas lint bench bench-once docs pictures tutorials wheel wheel-test clean
 
 demo: $(VENV)/.ready
 	$(BIN)/flownav fly --out out/sortie.fnr --force
@@ -44,6 +44,9 @@ made-flights: $(VENV)/.ready
 
 explain: $(VENV)/.ready
 	$(BIN)/python tools/explain.py docs/explanation/explained.md --data $${FLOWNAV_DATA:-../shared/data} $(if $(CALIBRATE),--calibrate)
+
+envelope: $(VENV)/.ready
+	$(BIN)/python tools/envelope.py docs/explanation/control.md
 
 integrity: $(VENV)/.ready
 	$(BIN)/python tools/integrity.py docs/explanation/integrity.md

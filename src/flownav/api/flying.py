@@ -145,7 +145,17 @@ def _facts(setup: Setup, seed: int, flights: int, *, dispersed: bool) -> dict[st
         "truth_model": "ensemble" if dispersed else "matched",
         "seed": seed,
         "flights": flights,
+        "notes": notes_of(setup),
     }
+
+
+def notes_of(setup: Setup) -> list[str]:
+    """Sentences on a scenario that is flown beyond the limits that its vehicle's file states; most have none."""
+    asked_m_s, stated_m_s = setup.scenario.wind.speed_20ft_m_s, setup.file.wind.max_speed_20ft_m_s
+    if stated_m_s == 0.0 or asked_m_s <= stated_m_s:
+        return []
+    limit = f"beyond the {stated_m_s:g} m/s that the vehicle's file states"
+    return [f"the wind of {asked_m_s:g} m/s at 20 ft is {limit} (docs/explanation/control.md, The envelope)"]
 
 
 def _nothing_of_many(setup: Setup) -> dict[str, Any]:

@@ -63,6 +63,7 @@ def show(facts: dict[str, Any], manifest: Mapping[str, Any], median: int) -> Non
     if "paper_percentile" in facts:
         say(_percentiles(facts["paper_percentile"]))
     which = f" (flight {median}, the one with the median largest error)" if many else ""
+    say(*(f"Note: {note}" for note in facts["notes"]), soft=True)
     say(*file_lines(facts, which), soft=True)
 
 

@@ -134,6 +134,12 @@ class Touchdown(ParameterModel):
     max_slide_m: Number = Field(0.3, gt=0.0, lt=20.0)  # from first contact to rest
 
 
+class StatedWind(ParameterModel):
+    """The wind up to which the vehicle is stated to land; `flownav fly` notes where a scenario's is stronger."""
+
+    max_speed_20ft_m_s: Number = Field(0.0, ge=0.0, le=30.0)  # steady speed at 20 ft, gusts about it; 0: not stated
+
+
 class VehicleFile(ParameterModel):
     """A vehicle file, schema 1."""
 
@@ -152,6 +158,7 @@ class VehicleFile(ParameterModel):
     pedal: Actuator
     drive: Drive
     touchdown: Touchdown = Touchdown()
+    wind: StatedWind = StatedWind()
 
 
 KIND = "multirotor"
@@ -220,3 +227,4 @@ class MultirotorFile(ParameterModel):
     fuselage: Fuselage
     skids: Skids
     touchdown: Touchdown = Touchdown()
+    wind: StatedWind = StatedWind()

@@ -26,7 +26,7 @@ from flownav.simulation.scenario import Scenario, load_scenario
 from integrity import placed
 
 SCENARIOS, SPEEDS_M_S = ("approach", "sortie"), (0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 13.5, 15.0)
-FLIGHTS, SEED = 96, 54500
+FLIGHTS, SEED = 192, 54500
 SPEED = "wind.speed_20ft_m_s"
 BEGIN, END = "<!-- make envelope: begin -->", "<!-- make envelope: end -->"
 HEADS = ("case", "wind at 20 ft [m/s]", "landed [%]", "crashed [%]", "R95 at rest [m]")

@@ -1,4 +1,4 @@
-"""The envelope: flights by the wind's speed, as a row of a table."""
+"""The envelope: flights by the wind's speed, as a row of a table, on the page and in its picture."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from docs_tools import pictures
 from flownav.api.flying import notes_of
 from flownav.api.scenario import Scenario
 from flownav.scoring.landings import REST_DISTANCE
@@ -39,7 +40,7 @@ def test_all_flights_of_a_row_have_its_speed_and_a_direction_of_their_own(envelo
     assert setup.scenario.wind.speed_20ft_m_s == 6.0
 
 
-def test_a_row_has_shares_and_a_radius(envelope):
+def test_a_row_has_shares_and_a_radius_and_the_picture_reads_it(envelope):
     landings = np.zeros((100, len(TOUCHDOWN_COLUMNS)))
     landings[:, TOUCHDOWN_COLUMNS.index("expected")] = 1.0
     landings[:, REST_DISTANCE] = 0.04
@@ -52,11 +53,19 @@ def test_a_row_has_shares_and_a_radius(envelope):
     assert "(100 flights a row, seed 7)" in table
     assert "| `approach` | 8 | 99.0 | 1.0 | 0.040 (0.040-" in table
     assert "| `approach` | 15 | 50.0 | 1.0 | none |" in table
+    read = pictures.campaigns.envelope_of(f"{envelope.BEGIN}\n\n{table}\n{envelope.END}")
+    assert list(read) == ["approach"]
+    np.testing.assert_array_equal(read["approach"], [(8.0, 99.0, 1.0, 0.04), (15.0, 50.0, 1.0, np.nan)])
+    with pytest.raises(ValueError, match="make envelope"):
+        pictures.campaigns.envelope_of("# A page\n")
 
 
-def test_the_page_has_the_place_for_the_table(envelope):
-    page = PAGE.read_text(encoding="utf-8")
-    assert "| x |" in envelope.placed(page, "| x |", str(PAGE), envelope.BEGIN, envelope.END)
+def test_the_page_has_every_case_in_every_wind_and_no_crash_up_to_the_stated_limit(envelope):
+    table = pictures.campaigns.envelope_of(PAGE.read_text(encoding="utf-8"))
+    assert list(table) == list(envelope.SCENARIOS)
+    for case, rows in table.items():
+        assert [row[0] for row in rows] == list(envelope.SPEEDS_M_S), case
+        assert [row for row in rows if row[0] <= STATED_M_S and row[2] > 0.0] == [], case
 
 
 @pytest.mark.parametrize(("wind_m_s", "vehicle", "says"), [

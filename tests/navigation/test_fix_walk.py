@@ -21,7 +21,7 @@ from flownav.navigation.reasons import FUSED, INNOVATION_GATE
 from flownav.navigation.records import FlowMemory, GpsMemory, LevelMemory, WitnessMemory
 
 FLOWS = FlowMemory(taken_s=9.9)
-AGREES = OwnVelocity(-0.05, 9.9, 0.0)  # the receiver's velocity says that the estimate is fast enough
+AGREES = OwnVelocity(-0.05, -0.1, 9.9, 0.0)  # the receiver's velocity says that the estimate is fast enough
 STEP_S = 0.2
 WALKS_M = 0.45  # innovation of a place that walks at 1 m/s, where the states take 0.45 of it
 
@@ -53,6 +53,7 @@ def test_a_walk_is_found_once_they_are_as_alike_as_those_of_one_error():
 
 @pytest.mark.parametrize(("own", "flow"), [
     (AGREES._replace(error_m_s=0.05), FLOWS),  # the receiver is faster than the estimate, which lags behind it
+    (AGREES._replace(before=0.1), FLOWS),  # it is so now
     (AGREES._replace(fused_s=10.0 - MOMENT_S - 0.1), FLOWS),
     (AGREES._replace(since_s=9.85), FLOWS),  # its velocity was refused a moment ago
     (AGREES, FLOWS._replace(taken_s=10.0 - MOMENT_S - 0.1)),

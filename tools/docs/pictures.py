@@ -19,6 +19,7 @@ from drawing import Picture, save
 FOLDER = Path(__file__).parents[2] / "docs" / "pictures"
 _DRAWN = (
     ("explanation/vehicle", models.ground_effect), ("explanation/control", models.margins),
+    ("explanation/control", campaigns.envelope),
     ("explanation/sensors", models.gps_errors), ("explanation/sensors", models.flow_noise),
     ("explanation/optics", models.pads), ("explanation/pad-target", models.pad_target), ("how-to/rig", models.rig),
     ("reference/scenarios", flights.paths), ("explanation/paper", flights.white_and_real_gps),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from drawing import COLOURS, axes
 from matplotlib.figure import Figure
@@ -10,6 +12,8 @@ from matplotlib.patches import Circle
 import flownav
 
 FLIGHTS = 256
+ENVELOPE = Path(__file__).parents[2] / "docs" / "explanation" / "control.md"  # `make envelope` writes the table into it
+ENVELOPE_BEGIN, ENVELOPE_END = "<!-- make envelope: begin -->", "<!-- make envelope: end -->"
 
 
 def touchdowns() -> Figure:
@@ -70,3 +74,39 @@ def tail() -> Figure:
     axis.set(yscale="log", xscale="log", xlabel="metres", ylabel="share of flights beyond it")
     axis.legend()
     return figure
+
+
+def envelope() -> Figure:
+    """How surely flights land, crash and how near they come to rest, by the wind at 20 ft, and the wind stated."""
+    table = envelope_of(ENVELOPE.read_text(encoding="utf-8"))
+    stated = flownav.Vehicle.load().file.wind.max_speed_20ft_m_s
+    figure, (shares, near) = axes(1, 2, 3.0)
+    for colour, (case, rows) in zip(COLOURS, table.items(), strict=False):
+        speed, landed, crashed, r95 = np.array(rows).T
+        shares.plot(speed, landed, "o-", markersize=3, color=colour, label=f"{case}: landed")
+        shares.plot(speed, crashed, "x:", markersize=4, color=colour, label="crashed")
+        near.plot(speed, r95, "o-", markersize=3, color=colour, label=case)
+    for axis in (shares, near):
+        axis.axvline(stated, color="#6b7280", linestyle="--", linewidth=1.0, label="stated limit")
+    shares.set(xlabel="wind at 20 ft [m/s]", ylabel="share of flights [%]", ylim=(-3, 103))
+    near.set(xlabel="wind at 20 ft [m/s]", ylabel="R95 at rest [m]", ylim=(0, None))
+    shares.legend(loc="center left")
+    near.legend()
+    return figure
+
+
+def envelope_of(page: str) -> dict[str, list[tuple[float, float, float, float]]]:
+    """The page's table by case: wind at 20 ft [m/s], landed and crashed [%], R95 at rest [m] (NaN: too few land).
+
+    ValueError where the page has none.
+    """
+    found: dict[str, list[tuple[float, float, float, float]]] = {}
+    for line in page.partition(ENVELOPE_BEGIN)[2].partition(ENVELOPE_END)[0].splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if cells[0].startswith("`"):
+            r95 = cells[4].partition(" ")[0]
+            row = (*map(float, cells[1:4]), np.nan if r95 == "none" else float(r95))
+            found.setdefault(cells[0].strip("`"), []).append(row)
+    if not found:
+        raise ValueError(f"no table after {ENVELOPE_BEGIN}; `make envelope` writes it")
+    return found

@@ -31,11 +31,12 @@ load_witness, _ = MEMORY.access(WitnessMemory)
 
 
 class OwnVelocity(NamedTuple):
-    """A receiver's velocity along an axis: its lasting error by the filter [m/s], when it was fused last, and when its
-    last refusals began or ended [s].
+    """A receiver's velocity along an axis: its lasting error by the filter and its last innovation [m/s], when it was
+    fused last, and when its last refusals began or ended [s].
     """
 
     error_m_s: float
+    before: float
     fused_s: float
     since_s: float
 
@@ -44,7 +45,7 @@ class OwnVelocity(NamedTuple):
 def own_velocity(work: Work, lanes: Lanes, axis: int, lane: int) -> OwnVelocity:
     """The receiver's velocity along an axis of a lane."""
     m = load_witness(work, lanes, OF_GPS + 3 + axis, lane)
-    return OwnVelocity(row_of(work, lanes, STATE + GPS_VELOCITY + axis, lane), m.fused_s, m.since_s)
+    return OwnVelocity(row_of(work, lanes, STATE + GPS_VELOCITY + axis, lane), m.before, m.fused_s, m.since_s)
 
 
 MEMORY.derive(OwnVelocity, own_velocity, "axis")
@@ -54,12 +55,12 @@ MEMORY.derive(OwnVelocity, own_velocity, "axis")
 def contradicted(innovation: float, own: OwnVelocity, flow: FlowMemory, t_s: float, fused_s: float) -> bool:
     """Whether flow and the receiver's own velocity carry the position, and it is not they who lag behind its place.
 
-    fused_s: when a place was fused last. A velocity that errs is seen by the receiver's, too: its error by the filter
-    has the sign of the innovation then.
+    fused_s: when a place was fused last. A velocity that errs is seen by the receiver's, too: its last innovation or
+    its error by the filter has the sign of the place's innovation then.
     """
     flowed = not (flow.doubted > 0.0 or np.isfinite(flow.wrong_s)) and t_s - flow.taken_s <= MOMENT_S
     agrees = t_s - own.fused_s <= MOMENT_S and own.since_s <= fused_s
-    return flowed and agrees and own.error_m_s * innovation <= 0.0
+    return flowed and agrees and own.error_m_s * innovation <= 0.0 and own.before * innovation <= 0.0
 
 
 @on_lanes(calls.watch_walk)

@@ -54,10 +54,15 @@ def changed(key, value):
 def test_the_shipped_vehicle_has_provenance_for_every_number():
     described = describe_vehicle()
     assert described.name.startswith("Maxi Joker 3")
-    assert len(described.entries) == 73
+    assert len(described.entries) == 74
     assert all(entry.source for entry in described.entries)
     unstated = {entry.key for entry in described.entries if not entry.uncertainty}
-    assert unstated == {"environment.gravity_m_s2", "main_rotor.blade_count", "tail_rotor.blade_count"}
+    assert unstated == {
+        "environment.gravity_m_s2",
+        "main_rotor.blade_count",
+        "tail_rotor.blade_count",
+        "wind.max_speed_20ft_m_s",
+    }
     by_key = {entry.key: entry for entry in described.entries}
     assert by_key["body.mass_kg"].value == load_vehicle().mass_kg
     assert "paper" in by_key["body.mass_kg"].source

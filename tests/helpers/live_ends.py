@@ -47,6 +47,7 @@ class Hover:
     imu: bool = True
     sigma_m: float = 0.5
     north_m: float = 0.0  # by so much GPS is off
+    north_m_s: float = 0.0  # and its own velocity
     noise: random.Random = field(default_factory=lambda: random.Random(4))
     steps: int = 0
     answers: bool = False  # TIMESYNC
@@ -75,7 +76,9 @@ class Hover:
             seen = reading(Sensor.RANGE, HEIGHT_M + 0.02 * shake[2])
             messages.append(say.distance_sensor(self.mav, time_us // 1000, seen, (0.1, 40.0)))
         if step % 20 == 0 and self.gps:
-            velocity = reading(Sensor.GPS_VELOCITY, 0.05 * shake[3], 0.05 * shake[4], math.nan, variance=0.04)
+            velocity = reading(
+                Sensor.GPS_VELOCITY, self.north_m_s + 0.05 * shake[3], 0.05 * shake[4], math.nan, variance=0.04
+            )
             place = (ORIGIN[0] + self.north_m / METRES_A_DEGREE, *ORIGIN[1:])
             messages.append(
                 say.gps_raw_int(

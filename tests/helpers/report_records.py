@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from flownav.core.record import Record
+from flownav.report.comparison import write_records
+from flownav.report.html import write_report
+from flownav.studies.compare.records import HEADINGS, cells, errors_in_time, rows_of_records
 
 PAPER_LANDING = {
     "title": "Table 6",
@@ -247,3 +252,14 @@ def replay(duration_s: float = 849.0, seed: int = 2, autopilot: bool = True, flo
         },
     }  # fmt: skip
     return record
+
+
+def write_pages(folder: Path, records: Mapping[str, Record]) -> dict[str, Path]:
+    """The pages of the records, and one that compares two flights (`compared`), in a folder, by name."""
+    for name, record in records.items():
+        write_report(record, folder / f"{name}.html")
+    named = [("a", flight()), ("b", flight(seed=2))]
+    errors = [errors_in_time(record) for _, record in named]
+    rows = [cells(row) for row in rows_of_records(named)]
+    write_records(named, errors, HEADINGS, rows, folder / "compared.html")
+    return {path.stem: path for path in folder.iterdir()}

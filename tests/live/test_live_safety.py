@@ -315,8 +315,9 @@ def shown(wire):
 
 
 def test_while_a_fault_is_suspected_nothing_is_sent_and_the_screen_names_it():
-    """GPS drifts north at 1 m/s; flow, IMU and the receiver's own velocity say that the vehicle hovers."""
+    """GPS drifts north at 1 m/s, its own velocity along with it; flow and IMU say that the vehicle hovers."""
     wire, told = hovering(12), {}
+    wire.vehicle.north_m_s = 1.0
 
     def drift():
         wire.vehicle.north_m += 0.01
@@ -334,16 +335,16 @@ def test_while_a_fault_is_suspected_nothing_is_sent_and_the_screen_names_it():
     assert wire.session.withheld["fault_suspected"] > 100
 
 
-@pytest.mark.parametrize("drift_m_s", [2.0, 5.0])
+@pytest.mark.parametrize("drift_m_s", [1.0, 2.0, 5.0])
 def test_a_position_that_leaves_its_receivers_velocity_and_the_flow_is_refused_before_it_leads_far(drift_m_s):
-    """4.8 m in 6 s before; slower ones lead further: at 1 m/s 2.0 m until it is suspected, at 0.5 m/s 2.5 m in 12 s."""
+    """4.8 m in 6 s before; a slower one is as sound receivers are: at 0.5 m/s 2.5 m in 12 s."""
     wire = hovering(12)
 
     def drift():
         wire.vehicle.north_m += 0.01 * drift_m_s
 
     wire.fly(12.0, beside=drift)
-    assert abs(wire.session.estimate.pos_ned_m[0]) < 0.5
+    assert abs(wire.session.estimate.pos_ned_m[0]) < 0.7
     assert wire.session.reason == ""
     assert wire.session.alarms[Sensor.GPS_POSITION].why == "innovation_gate"
 

@@ -13,11 +13,8 @@ import pytest
 
 from browsing import Visit
 from flownav.core.record import Record
-from flownav.report.comparison import write_records
-from flownav.report.html import write_report
 from flownav.report.series import start_end_s
-from flownav.studies.compare.records import HEADINGS, cells, errors_in_time, rows_of_records
-from report_records import flight, navigated, replay
+from report_records import flight, navigated, replay, write_pages
 
 pytestmark = pytest.mark.browser
 
@@ -51,13 +48,7 @@ FROM_THE_TOP = """[...document.querySelectorAll("[data-figure]")]
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("reports")
     records: dict[str, Record] = {"landing": navigated(), "takeoff": flight("takeoff"), "replay": replay()}
-    for name, record in records.items():
-        write_report(record, folder / f"{name}.html")
-    named = [("a", flight()), ("b", flight(seed=2))]
-    errors = [errors_in_time(record) for _, record in named]
-    rows = [cells(row) for row in rows_of_records(named)]
-    write_records(named, errors, HEADINGS, rows, folder / "compared.html")
-    return {path.stem: path for path in folder.iterdir()}
+    return write_pages(folder, records)
 
 
 @pytest.fixture(scope="module")

@@ -9,12 +9,9 @@ import numpy as np
 import pytest
 
 from browsing import Visit
-from flownav.report.comparison import write_records
-from flownav.report.html import write_report
 from flownav.report.style import PALETTE
-from flownav.studies.compare.records import HEADINGS, cells, errors_in_time, rows_of_records
 from page_looks import complaints, ground_of, rgb
-from report_records import flight, navigated, replay
+from report_records import navigated, replay, write_pages
 
 pytestmark = pytest.mark.browser
 
@@ -32,13 +29,7 @@ SHOWN = """(name) => [...document.querySelectorAll(`.landing-picture .${name}`)]
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("looks")
-    for name, record in {"landing": navigated(), "replay": replay()}.items():
-        write_report(record, folder / f"{name}.html")
-    named = [("a", flight()), ("b", flight(seed=2))]
-    errors = [errors_in_time(record) for _, record in named]
-    rows = [cells(row) for row in rows_of_records(named)]
-    write_records(named, errors, HEADINGS, rows, folder / "compared.html")
-    return {path.stem: path for path in folder.iterdir()}
+    return write_pages(folder, {"landing": navigated(), "replay": replay()})
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(390, "light"), (390, "dark"), (1600, "light"), (1600, "dark")])

@@ -5,6 +5,7 @@ import os
 import time
 from typing import Any
 
+from flownav.campaigns.certification.again import SAMPLE
 from flownav.campaigns.certification.cells import plan_of
 from flownav.campaigns.engines import Local, Part
 from flownav.campaigns.plan import Ready
@@ -12,7 +13,7 @@ from flownav.campaigns.ranking import flights_of
 from flownav.campaigns.requirement import load_requirement
 from flownav.core.compile import LANES, announce_compilation
 
-RANKING_ROWS, FLOWN_AGAIN = 64, 64  # as `flownav certify` has them unless it is asked for others
+RANKING_ROWS = 64  # as `flownav certify` has them unless it is asked for others
 
 
 def pace_of(requirement: str) -> dict[str, Any]:
@@ -24,7 +25,7 @@ def pace_of(requirement: str) -> dict[str, Any]:
     plan = plan_of(load_requirement(requirement))
     cell = plan.ready(0)
     inputs = 0 if cell.ensemble is None else len(cell.ensemble.entries)
-    flights = plan.flights * len(plan.cells) + FLOWN_AGAIN + flights_of(inputs, RANKING_ROWS)
+    flights = plan.flights * len(plan.cells) + SAMPLE + flights_of(inputs, RANKING_ROWS)
     flown = len(LANES) * (os.cpu_count() or 1)
     with announce_compilation("simulator"):
         _seconds(cell, plan.seed, len(LANES))

@@ -13,7 +13,7 @@ from flownav.estimation.laws.still import pad_below
 from flownav.estimation.states import GPS_FAST, GPS_SLOW, GPS_VELOCITY, PAD, POSITION, STATE, VELOCITY
 from flownav.navigation import calls
 from flownav.navigation.fault_signs import sign_drift
-from flownav.navigation.fix_walk import MOMENT_S, hold_walk, watch_walk
+from flownav.navigation.fix_walk import MOMENT_S, agrees, hold_walk, is_doubted, watch_walk
 from flownav.navigation.kernel_settings import GpsSettings
 from flownav.navigation.memory import MEMORY
 from flownav.navigation.motion_records import SteadyForce
@@ -240,16 +240,16 @@ def judge_fate(
     axis = place - OF_GPS if position else place - OF_GPS - 3
     value, _ = component_of(reading, axis)
     here = reading.arrived > 0.0
-    doubted = flow.doubted > 0.0 or bool(np.isfinite(flow.wrong_s))
+    doubted = is_doubted(flow)
     ratio = gate_ratio(tested, s.gate_sigma) if tested.reason == INNOVATION_GATE else 0.0
     flowed = not doubted and t_s - flow.taken_s <= MOMENT_S
     above = not np.isfinite(ranged.refused_s) and t_s - ranged.taken_s <= MOMENT_S
     carried_s = ranged.taken_s if axis == 2 else flow.taken_s
-    agreed = t_s - along.agreed_s <= MOMENT_S and along.agrees_since_s <= m.fused_s
-    agrees = position and agreed and t_s - carried_s <= MOMENT_S
-    seen = agrees or (above if axis == 2 else flowed)
+    velocity_agrees = position and agrees(along.agreed_s, along.agrees_since_s, m.fused_s, t_s)
+    carried = velocity_agrees and t_s - carried_s <= MOMENT_S
+    seen = carried or (above if axis == 2 else flowed)
     fused_s = t_s - m.fused_s
-    leapt_now = leaps(tested, ratio, position, along.velocity_variance, fused_s) and (agrees or fused_s <= MOMENT_S)
+    leapt_now = leaps(tested, ratio, position, along.velocity_variance, fused_s) and (carried or fused_s <= MOMENT_S)
     reset, after = judge_rejections(ratio, position, doubted, t_s, m, s, seen, leapt_now)
     off = position and seen and after.leapt > 0.0
     after = with_fused(after, fused_s=t_s) if tested.reason == FUSED or (reset and off) else after

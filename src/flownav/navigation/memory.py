@@ -56,6 +56,7 @@ from flownav.navigation.records import (
     ScaleDoubt,
     StartMemory,
     SuspicionMemory,
+    WalkMemory,
     WhitenessMemory,
     WitnessMemory,
 )
@@ -85,6 +86,7 @@ COURSE = MEMORY.keep(CourseMemory)
 MEMORY.keep(PushMemory)
 MEMORY.keep(StandMemory)
 MEMORY.keep(GpsMemory)
+MEMORY.keep(WalkMemory)
 MEMORY.keep(LevelMemory)
 MEMORY.keep(PadMemory)
 GROUNDED = MEMORY.row(StandMemory, "grounded")

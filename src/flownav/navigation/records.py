@@ -237,18 +237,22 @@ class LevelMemory(NamedTuple):
 
 class GpsMemory(NamedTuple):
     """last_fix_s: when GPS last measured north or east; moved_n_m and moved_e_m: how far resets to GPS moved the
-    position, back and forth added up. alike_n and alike_e: how alike the innovations of its position are while flow and
-    its own velocity contradict them; walked_s: when it was last found to walk off, and
-    walked_ratio: its test ratio then.
+    position, back and forth added up.
     """
 
     last_fix_s: float = -inf
     moved_n_m: float = 0.0
     moved_e_m: float = 0.0
+
+
+class WalkMemory(NamedTuple):
+    """A GPS position that walks off: alike_n and alike_e: how alike its innovations along north and east are while flow
+    and the receiver's own velocity contradict them; found_s: when it was last found to walk [s].
+    """
+
     alike_n: float = 0.0
     alike_e: float = 0.0
-    walked_s: float = -inf
-    walked_ratio: float = 0.0
+    found_s: float = -inf
 
 
 class PadMemory(NamedTuple):

@@ -27,7 +27,6 @@ from replay_logs import log_of_flight
 from ros_bags import BagMaker, StoragePlugin, ros_flight
 from ulog_files import ulog_of_flight
 
-
 SOON_S = 5.0
 
 

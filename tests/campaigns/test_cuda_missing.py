@@ -41,6 +41,14 @@ def test_no_device_is_one_line_that_says_what_to_do(line):
     assert "no CUDA device was found" in line or "numba-cuda is not installed" in line
 
 
+@pytest.mark.parametrize("more", [["--plan"], ["--out", "certificate"]])
+def test_a_plan_needs_the_device_as_its_flights_do(tmp_path, monkeypatch, more):
+    if find_spec("numba_cuda") is not None:
+        monkeypatch.setattr("numba.cuda.is_available", lambda: False)
+    done = run("certify", "approach", "--engine", "cuda", *more, cwd=tmp_path)
+    assert "--engine cuda: " in complaint(tmp_path / "certificate", done)
+
+
 def test_a_missing_library_is_named_with_its_extra(monkeypatch):
     from flownav.campaigns.cuda import Cuda
     from flownav.core.errors import InputError

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import bz2
+import os
 import sqlite3
+import time
 from contextlib import closing
 
 import pytest
@@ -14,16 +16,18 @@ from crazyflie_logs import deck_log
 from crazyflie_logs import quantised as deck_tables
 from dataflash_files import dataflash_of
 from flownav.core.errors import InputError
-from flownav.logs.assembly import MOST_BYTES, content_of
+from flownav.logs.assembly import MOST_BYTES, MOST_HOLE_BYTES, content_of, require_written
 from flownav.logs.csv_table import MOST_COLUMNS, MOST_HEADER_BYTES
 from flownav.logs.open_log import open_log
-from flownav.logs.ros.bag import Bag, TooLargeError, _rows, _Unpacking
-from flownav.logs.ros.containers import messages
+from flownav.logs.ros.bag import MCAP_MAGIC, Bag, TooLargeError, _rows, _Unpacking
+from flownav.logs.ros.containers import ATTACHMENT, CHANNEL, CHUNK, MESSAGE, SCHEMA, messages
 from fuzzing import FLOOR_BYTES, peak_bytes
 from mavlink_logs import flight_log
 from replay_logs import log_of_flight
 from ros_bags import BagMaker, StoragePlugin, ros_flight
 from ulog_files import ulog_of_flight
+
+SOON_S = 5.0
 
 
 @pytest.fixture
@@ -62,6 +66,56 @@ def test_a_log_of_four_gigabytes_of_nothing_is_refused(folder, tmp_path):
         assert f"{name}: larger than 1024 MB; cut the log into pieces" in refused(lengthened(tmp_path / name))
     lengthened(folder / "gps.csv")
     assert "gps.csv: larger than 1024 MB; cut the log into pieces" in refused(folder)
+
+
+def holed(path, content, place, size=4 << 30):
+    """A file whose content has a hole of nothing from a place on, which takes no room on the disk."""
+    with path.open("wb") as file:
+        file.write(content[:place])
+        file.seek(size, os.SEEK_CUR)
+        file.write(content[place:])
+    return lengthened(path, len(content) + size)
+
+
+def test_a_hole_of_a_gigabyte_in_a_log_is_refused(tmp_path):
+    """Of 4 GB in bags, which have no largest size; of less than that in the logs that have one."""
+    flown = log_of_flight(4.0)
+    bags = ros_flight(flown.tables)
+    contents = {"x.bag": bags.write_ros_1(tmp_path / "made.bag").read_bytes()}
+    for storage in StoragePlugin:
+        (file,) = (made for made in bags.write(tmp_path / storage.name, storage).iterdir() if made.suffix != ".yaml")
+        contents[f"x{file.suffix}"] = file.read_bytes()
+    logs = {
+        "x.tlog": flight_log(4.0).content,
+        "x.bbl": blackbox_log(box_tables(flown.tables, inav=True), inav=True).content(),
+        "x.log": deck_log(deck_tables(flown.tables)).content(),
+        "x.bin": dataflash_of(flown).content(),
+        "x.ulg": ulog_of_flight(flown.tables).bytes(),
+    }
+    assert set(contents) == {"x.bag", "x.mcap", "x.db3"}
+    for name, content in (contents | logs).items():
+        for place in (4096, len(content) // 2, len(content)):
+            path = holed(tmp_path / name, content, place, (4 << 30) if name in contents else (1 << 30) - len(content))
+            begun = time.perf_counter()
+            assert f"{name}: more than 16 MB of it, from byte " in (said := refused(path))
+            assert said.endswith("were never written; copy it again, or cut it there")
+            assert time.perf_counter() - begun < SOON_S
+
+
+def test_a_small_hole_is_read_over(tmp_path):
+    """As a recorder that reserves room before it writes leaves one at the end."""
+    content = ulog_of_flight(log_of_flight(4.0).tables).bytes()
+    path = holed(tmp_path / "x.ulg", content, len(content), MOST_HOLE_BYTES - (64 << 10))
+    (tmp_path / "y.ulg").write_bytes(content)
+    assert set(open_log(path).streams) == set(open_log(tmp_path / "y.ulg").streams)
+
+
+def test_holes_that_the_file_system_does_not_tell_are_none(tmp_path, monkeypatch):
+    path = holed(tmp_path / "x.log", b"x", 1, MOST_HOLE_BYTES + (1 << 20))
+    with pytest.raises(InputError, match="never written"):
+        require_written(path, path.stat().st_size)
+    monkeypatch.delattr("os.SEEK_HOLE")
+    require_written(path, path.stat().st_size)
 
 
 def test_what_the_memory_does_not_hold_is_said(folder, monkeypatch):
@@ -174,6 +228,39 @@ def test_an_index_that_all_chunks_share_is_no_index(tmp_path):
     (tmp_path / "x.bag").write_bytes(many)
     said = "no readable ROS 1 bag (its index has more entries than its bytes can hold); try `rosbag reindex`"
     assert said in refused(tmp_path / "x.bag")
+
+
+def notes_on(path):
+    """The notes on an MCAP file without a message, read soon and in little memory."""
+    bag, before, begun = Bag(), peak_bytes(anew=True), time.perf_counter()
+    assert list(messages(path, bag, lambda channel: True)) == []
+    assert peak_bytes() - before < FLOOR_BYTES
+    assert time.perf_counter() - begun < SOON_S
+    return bag.notes
+
+
+def test_zeros_are_no_records_of_mcap(tmp_path):
+    """They were nine bytes each: 4 GB of them had no end."""
+    path = holed(tmp_path / "x.mcap", MCAP_MAGIC, len(MCAP_MAGIC))
+    assert notes_on(path) == [
+        f"x.mcap: damaged (no record at byte 8 of {path.stat().st_size}); what follows is left out"
+    ]
+
+
+@pytest.mark.parametrize("kind", [SCHEMA, CHANNEL, MESSAGE, CHUNK, ATTACHMENT])
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_record_of_gigabytes_is_not_read(tmp_path, kind, whole):
+    stated = (4 << 30) if whole else 1 << 62
+    content = MCAP_MAGIC + bytes([kind]) + stated.to_bytes(8, "little")
+    path = holed(tmp_path / "x.mcap", content, len(content))
+    with path.open("ab") as file:  # a channel behind it, which is read where its length was true
+        channel = b"\1\0\0\0\1\0\0\0a\3\0\0\0cdr\0\0\0\0"
+        file.write(bytes([CHANNEL]) + len(channel).to_bytes(8, "little") + channel)
+    bag = Bag()
+    list(messages(path, bag, lambda channel: True))
+    assert {channel.topic for channel in bag.channels} == ({"a"} if whole else set())
+    lost = "one record is damaged and left out" if whole else f"damaged (a record of {stated} bytes at byte 8 of "
+    assert notes_on(path)[0].startswith(f"x.mcap: {lost}")
 
 
 def test_a_chunk_in_a_chunk_is_damage(tmp_path):

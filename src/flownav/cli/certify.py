@@ -98,6 +98,7 @@ def command(
     if plan_only:  # what cannot be flown, signed or written is refused here, as it is without --plan
         for cell in range(len(plan.cells)):
             plan.ready(cell)
+        engine_named(engine)
         if out is not None:
             Store(an_output_folder(out)).check(plan.as_json)
         _say_plan(asked, as_json)

@@ -12,6 +12,7 @@ from typing import Any
 
 from flownav.core.errors import InputError
 from flownav.core.guard import an_input
+from flownav.logs.assembly import require_written
 from flownav.logs.ros.bag import (
     MCAP_MAGIC,
     ROS1_MAGIC,
@@ -28,6 +29,11 @@ from flownav.logs.ros.bag import (
 SCHEMA, CHANNEL, MESSAGE, CHUNK, ATTACHMENT, DATA_END = 3, 4, 5, 6, 9, 15
 LARGEST_CHUNK, LARGEST_RATIO = 256 << 20, 200  # bytes, and times the packed size: recorders write chunks of a few MB
 LARGEST_ATTACHMENT, LARGEST_DEFINITION, MOST_CHANNELS = 16 << 20, 1 << 20, 65536
+LARGEST_MESSAGE = 64 << 20  # chosen: none that is read has a picture in it
+LARGEST = {  # bytes of a record, before anything of it is read; what is larger is left out
+    SCHEMA: LARGEST_DEFINITION + (1 << 16), CHANNEL: LARGEST_DEFINITION, MESSAGE: LARGEST_MESSAGE,
+    CHUNK: LARGEST_CHUNK + (1 << 16), ATTACHMENT: LARGEST_ATTACHMENT,
+}  # fmt: skip
 
 
 class Damage(Exception):
@@ -49,11 +55,15 @@ class _Walk:
         while start + 9 <= end:
             kind, length = content[start], int.from_bytes(content[start + 1 : start + 9], "little")
             begin, stop = start + 9, start + 9 + length
+            if kind == 0:  # which the format has not: zeros, where nothing was written
+                raise Damage(f"no record at byte {start} of {end}")
             if stop > end:
-                if kind == CHUNK:  # cut off in its middle: what is there of it
+                if kind == CHUNK and end - begin <= LARGEST[CHUNK]:  # cut off in its middle: what is there of it
                     yield from self._other(kind, content[begin:end])
                 raise Damage(f"a record of {length} bytes at byte {start} of {end}")
-            if kind == MESSAGE:
+            if length > LARGEST.get(kind, length):
+                self.lost += 1
+            elif kind == MESSAGE:
                 if length >= 22:
                     number, _, log_ns, _ = struct.unpack_from("<HIQQ", content, begin)
                     if number in self.taken:
@@ -178,14 +188,23 @@ def is_bag_folder(folder: Path) -> bool:
 def files_of(path: Path) -> list[Path]:
     """The files of a bag, in the order of their names. InputError where a folder holds none that can be read."""
     if not an_input(path).is_dir():
-        return [path]
+        return [_written(path)]
     files = sorted(file for file in path.iterdir() if file.suffix.lower() in (".mcap", ".db3"))
     packed = sorted(file.name for file in path.iterdir() if file.name.endswith((".db3.zstd", ".mcap.zstd")))
     if packed:
         raise InputError(f"{path}: {packed[0]} is compressed as a whole; unpack it first (unzstd {packed[0]})")
     if not files:
         raise InputError(f"{path}: no .mcap or .db3 file in it; a ROS 2 bag's folder is needed")
-    return [an_input(file) for file in files]
+    return [_written(an_input(file)) for file in files]
+
+
+def _written(file: Path) -> Path:
+    """The file. InputError where much of it is a hole."""
+    try:
+        require_written(file, file.stat().st_size)
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read ({error.strerror}); see who may read it") from error
+    return file
 
 
 def messages(path: Path, bag: Bag, wanted: Wanted) -> Iterator[Message]:

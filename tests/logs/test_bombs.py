@@ -16,8 +16,9 @@ from crazyflie_logs import deck_log
 from crazyflie_logs import quantised as deck_tables
 from dataflash_files import dataflash_of
 from flownav.core.errors import InputError
-from flownav.logs.assembly import MOST_BYTES, MOST_HOLE_BYTES, content_of, require_written
+from flownav.logs.assembly import MOST_BYTES, content_of
 from flownav.logs.csv_table import MOST_COLUMNS, MOST_HEADER_BYTES
+from flownav.logs.holes import MOST_HOLE_BYTES, require_written
 from flownav.logs.open_log import open_log
 from flownav.logs.ros.bag import MCAP_MAGIC, Bag, TooLargeError, _rows, _Unpacking
 from flownav.logs.ros.containers import ATTACHMENT, CHANNEL, CHUNK, MESSAGE, SCHEMA, messages

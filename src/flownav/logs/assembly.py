@@ -1,7 +1,6 @@
 """From a reader's columns to a Stream: rows in time order; what cannot be is thrown away and counted in any format."""
 
 import hashlib
-import os
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from flownav.core.errors import InputError
 from flownav.core.guard import an_input
 from flownav.core.measurement import COLUMNS, Array, Sensor, Stream
+from flownav.logs.holes import require_written
 
 LATE_SHARE = 0.05  # more rows than this out of time order: not a late row here and there
 LONGEST_GAP_S = 600.0  # a few rows further away than this carry a wrong time
@@ -38,7 +38,6 @@ MAY_LACK = {  # NaN: not measured
 }  # fmt: skip
 PLACE = ("lat_deg", "lon_deg", "alt_m")
 MOST_BYTES = 1 << 30  # of a log that is read whole, which takes two or three times as much memory
-MOST_HOLE_BYTES = 16 << 20  # chosen: recorders write what they have; a copy that broke off may leave gigabytes
 SLOW_S, HELD_S = 0.01, 0.1  # a slow sensor's value stands in every row: again only if it changed, or after this long
 QUICK_S = 0.015  # rows that follow each other faster are a quick logger's: barometers give 50 readings a second at most
 SEA_LEVEL_PA = 101325.0
@@ -308,40 +307,6 @@ def checked_size(path: Path, most_bytes: int = MOST_BYTES) -> int:
         raise InputError(f"{path}: larger than {most_bytes >> 20} MB; cut the log into pieces")
     require_written(path, size)
     return size
-
-
-def require_written(path: Path, size: int) -> None:
-    """InputError where more than MOST_HOLE_BYTES of a file's `size` bytes were never written: a hole, read as zeros.
-
-    Where the file system does not tell holes, there are none. OSError where there is no file.
-    """
-    hole = _first_hole(path, size) if size > MOST_HOLE_BYTES else None
-    if hole is not None:
-        raise InputError(
-            f"{path}: more than {MOST_HOLE_BYTES >> 20} MB of it, from byte {hole} on, were never written; copy it "
-            "again, or cut it there"
-        )
-
-
-def _first_hole(path: Path, size: int) -> int | None:
-    """Where the first hole of a file begins; None where all its holes together are no larger than allowed."""
-    to_data, to_hole = getattr(os, "SEEK_DATA", None), getattr(os, "SEEK_HOLE", None)
-    if to_data is None or to_hole is None:
-        return None
-    with path.open("rb") as file:
-        first, left, place = None, MOST_HOLE_BYTES, 0
-        while place < size and left >= 0:
-            try:
-                begin = os.lseek(file.fileno(), place, to_hole)
-            except OSError:  # a file system without holes
-                return None
-            try:
-                place = os.lseek(file.fileno(), begin, to_data)
-            except OSError:  # no data behind it
-                place = size
-            first = begin if first is None else first
-            left -= place - begin
-    return first if left < 0 else None
 
 
 def content_of(path: Path, what: str, most_bytes: int = MOST_BYTES) -> bytes:

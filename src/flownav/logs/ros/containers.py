@@ -12,7 +12,7 @@ from typing import Any
 
 from flownav.core.errors import InputError
 from flownav.core.guard import an_input
-from flownav.logs.assembly import require_written
+from flownav.logs.holes import require_written
 from flownav.logs.ros.bag import (
     MCAP_MAGIC,
     ROS1_MAGIC,

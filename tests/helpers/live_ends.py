@@ -47,7 +47,7 @@ class Hover:
     imu: bool = True
     sigma_m: float = 0.5
     north_m: float = 0.0  # by so much GPS is off
-    north_m_s: float = 0.0  # and its own velocity
+    north_m_s: float = 0.0  # by so much its velocity is off
     noise: random.Random = field(default_factory=lambda: random.Random(4))
     steps: int = 0
     answers: bool = False  # TIMESYNC

@@ -335,16 +335,16 @@ def test_while_a_fault_is_suspected_nothing_is_sent_and_the_screen_names_it():
     assert wire.session.withheld["fault_suspected"] > 100
 
 
-@pytest.mark.parametrize("drift_m_s", [1.0, 2.0, 5.0])
-def test_a_position_that_leaves_its_receivers_velocity_and_the_flow_is_refused_before_it_leads_far(drift_m_s):
-    """4.8 m in 6 s before; a slower one is as sound receivers are: at 0.5 m/s 2.5 m in 12 s."""
+@pytest.mark.parametrize(("drift_m_s", "most_m"), [(1.0, 0.7), (2.0, 0.5), (5.0, 0.5)])
+def test_a_position_that_leaves_its_receivers_velocity_and_the_flow_is_refused_before_it_leads_far(drift_m_s, most_m):
+    """It led 4.8 m off in 6 s. A slower one drifts as sound receivers do: at 0.5 m/s 2.5 m in 12 s."""
     wire = hovering(12)
 
     def drift():
         wire.vehicle.north_m += 0.01 * drift_m_s
 
     wire.fly(12.0, beside=drift)
-    assert abs(wire.session.estimate.pos_ned_m[0]) < 0.7
+    assert abs(wire.session.estimate.pos_ned_m[0]) < most_m
     assert wire.session.reason == ""
     assert wire.session.alarms[Sensor.GPS_POSITION].why == "innovation_gate"
 

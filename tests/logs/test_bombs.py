@@ -53,16 +53,19 @@ def lengthened(path, size=4 << 30):
     return path
 
 
-def test_a_log_of_four_gigabytes_of_nothing_is_refused(folder, tmp_path):
-    flown = log_of_flight(4.0)
-    logs = {
+def logs_of(flown):
+    """The contents of a log in each format that is read whole, by file name."""
+    return {
         "x.tlog": flight_log(4.0).content,
         "x.bbl": blackbox_log(box_tables(flown.tables, inav=True), inav=True).content(),
         "x.log": deck_log(deck_tables(flown.tables)).content(),
         "x.bin": dataflash_of(flown).content(),
         "x.ulg": ulog_of_flight(flown.tables).bytes(),
     }
-    for name, content in logs.items():
+
+
+def test_a_log_of_four_gigabytes_of_nothing_is_refused(folder, tmp_path):
+    for name, content in logs_of(log_of_flight(4.0)).items():
         (tmp_path / name).write_bytes(content)
         assert f"{name}: larger than 1024 MB; cut the log into pieces" in refused(lengthened(tmp_path / name))
     lengthened(folder / "gps.csv")
@@ -86,13 +89,7 @@ def test_a_hole_of_a_gigabyte_in_a_log_is_refused(tmp_path):
     for storage in StoragePlugin:
         (file,) = (made for made in bags.write(tmp_path / storage.name, storage).iterdir() if made.suffix != ".yaml")
         contents[f"x{file.suffix}"] = file.read_bytes()
-    logs = {
-        "x.tlog": flight_log(4.0).content,
-        "x.bbl": blackbox_log(box_tables(flown.tables, inav=True), inav=True).content(),
-        "x.log": deck_log(deck_tables(flown.tables)).content(),
-        "x.bin": dataflash_of(flown).content(),
-        "x.ulg": ulog_of_flight(flown.tables).bytes(),
-    }
+    logs = logs_of(flown)
     assert set(contents) == {"x.bag", "x.mcap", "x.db3"}
     for name, content in (contents | logs).items():
         for place in (4096, len(content) // 2, len(content)):

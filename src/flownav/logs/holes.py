@@ -1,4 +1,4 @@
-"""A log of which much was never written: a hole, which the file system gives as zeros without end."""
+"""Refuses a log with a large hole: a part that was never written, which the file system reads as zeros."""
 
 import os
 from pathlib import Path
@@ -11,7 +11,7 @@ MOST_HOLE_BYTES = 16 << 20  # chosen: recorders write what they have; a copy tha
 def require_written(path: Path, size: int) -> None:
     """InputError where more than MOST_HOLE_BYTES of a file's `size` bytes were never written: a hole, read as zeros.
 
-    Where the file system does not tell holes, there are none. OSError where there is no file.
+    A file system that does not report holes has none. OSError where there is no file.
     """
     hole = _first_hole(path, size) if size > MOST_HOLE_BYTES else None
     if hole is not None:

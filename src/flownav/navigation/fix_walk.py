@@ -21,7 +21,7 @@ from flownav.navigation.verdicts import Tested, on_lanes
 
 MOMENT_S = 1.5  # chosen: seven fixes of 5 Hz, in which flow and accelerometer cannot lose the way
 SOUND_M_S = 0.6  # sound receivers part from their own velocity by 0.56 m/s at most, over 10 s (integrity.md)
-HELD_S = 2.0  # chosen: after it a place that walks on at 0.5 m/s and more has left its gate of a metre
+HELD_S = 2.0  # chosen: in it a place that walks on at 1 m/s leaves its gate (test_live_safety)
 ONE_ERROR = 1.0  # innovations with the same error are as alike as this and more (`alike`)
 HELD_RATIO = 1.0 + 1e-9  # of a place: more than 1 is refused along north and east (`offers.spoilt_whole`)
 
@@ -67,8 +67,8 @@ def agrees(fused_s: float, since_s: float, placed_s: float, t_s: float) -> bool:
 def contradicted(innovation: float, own: OwnVelocity, flow: FlowMemory, placed_s: float, t_s: float) -> bool:
     """Whether flow and the receiver's own velocity carry the position, and it is not they who lag behind its place.
 
-    placed_s: when the place was fused last. A velocity that errs is seen by the receiver's, too: its last innovation
-    has the sign of the place's then.
+    placed_s: when the place was fused last. Where the estimate's velocity errs, the receiver's velocity shows it: its
+    last innovation then has the sign of the place's.
     """
     flows = not is_doubted(flow) and t_s - flow.taken_s <= MOMENT_S
     return flows and agrees(own.fused_s, own.since_s, placed_s, t_s) and own.before * innovation <= 0.0
@@ -81,7 +81,7 @@ def watch_walk(
     """After the test of a place along north (0) or east (1): how alike innovations that are fused are, on average over
     AGREEMENT_S, while the velocities contradict them.
 
-    A place parts from the velocities by what the states take of its innovation, (total - variance) / total of it.
+    A place parts from the velocities by the share of its innovation that the states take: 1 - variance / total.
     """
     step_s = t_s - before.received_s
     parts = abs(tested.innovation) * (tested.total - tested.variance) > SOUND_M_S * step_s * tested.total

@@ -220,12 +220,13 @@ def first_refusals(
     offers: Array, sensors: tuple[Sensor, ...], window_s: tuple[float, float], horizon_s: float, warned_s: float | None
 ) -> float | None:
     """Time at which more readings of the struck sensors than ever before had been refused within a second, or of a
-    warning.
+    warning. A component within its own gate that is held back, or refused with another, does not count.
     """
     t0_s, t1_s = window_s
     offered = InnovationRow.of(offers)
     refused = np.isin(offered.sensor, [int(sensor) for sensor in sensors]) & (offered.reason != Reason.FUSED)
     refused &= ~np.isin(offered.reason, (Reason.DATUM, Reason.BEFORE_START))
+    refused &= (offered.reason != Reason.INNOVATION_GATE) | (offered.test_ratio > 1.0)
     times = offered.t_s[refused] + horizon_s
     count = np.arange(len(times)) - np.searchsorted(times, times - WITHIN_S, side="right") + 1
     usual = count[times < t0_s].max(initial=0)

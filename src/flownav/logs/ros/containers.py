@@ -29,7 +29,7 @@ from flownav.logs.ros.bag import (
 SCHEMA, CHANNEL, MESSAGE, CHUNK, ATTACHMENT, DATA_END = 3, 4, 5, 6, 9, 15
 LARGEST_CHUNK, LARGEST_RATIO = 256 << 20, 200  # bytes, and times the packed size: recorders write chunks of a few MB
 LARGEST_ATTACHMENT, LARGEST_DEFINITION, MOST_CHANNELS = 16 << 20, 1 << 20, 65536
-LARGEST_MESSAGE = 64 << 20  # chosen: none that is read has a picture in it
+LARGEST_MESSAGE = 64 << 20  # chosen: no topic that is read carries pictures
 LARGEST = {  # bytes of a record, before anything of it is read; what is larger is left out
     SCHEMA: LARGEST_DEFINITION + (1 << 16), CHANNEL: LARGEST_DEFINITION, MESSAGE: LARGEST_MESSAGE,
     CHUNK: LARGEST_CHUNK + (1 << 16), ATTACHMENT: LARGEST_ATTACHMENT,
@@ -55,7 +55,7 @@ class _Walk:
         while start + 9 <= end:
             kind, length = content[start], int.from_bytes(content[start + 1 : start + 9], "little")
             begin, stop = start + 9, start + 9 + length
-            if kind == 0:  # which the format has not: zeros, where nothing was written
+            if kind == 0:  # no kind of the format: zeros, where nothing was written
                 raise Damage(f"no record at byte {start} of {end}")
             if stop > end:
                 if kind == CHUNK and end - begin <= LARGEST[CHUNK]:  # cut off in its middle: what is there of it

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -152,5 +153,10 @@ def test_a_plan_refuses_a_key_and_a_folder_that_a_flight_would_refuse(tmp_path):
         assert isinstance(done.exception, InputError)
         assert why in str(done.exception)
     assert isinstance(run("approach", "--plan", "--sign", tmp_path / "absent.pem").exception, InputError)
-    assert run("approach", "--plan", "--out", tmp_path / "new").exception is None
+    for name in (Path("/proc/nowhere/new"), tmp_path / "file" / "new"):
+        done = run("approach", "--plan", "--out", name)
+        assert isinstance(done.exception, InputError)
+        assert str(done.exception).startswith(f"{name}: cannot be written (")
+    assert run("approach", "--plan", "--out", tmp_path / "new" / "er").exception is None
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "link", "mine"]
     assert not (tmp_path / "new").exists()

@@ -12,7 +12,7 @@ from flownav.live.autopilots import COMPONENT, KNOWN, NONE, TURN_S, VEHICLE, Aut
 from flownav.live.filtering import Keeper
 from flownav.live.options import Options
 from flownav.logs.mavlink.framing import ARDUPILOT, INVALID_AUTOPILOT, PX4, coder
-from live_ends import Hover, Wire, hovering
+from live_ends import ORIGIN, Hover, Wire, hovering
 
 QUADROTOR, GIMBAL, GCS, TRACKER, GENERIC = 2, 26, 6, 5, 0
 MOVES, PLACES = 105, 24  # HIGHRES_IMU, GPS_RAW_INT
@@ -116,6 +116,26 @@ def test_from_another_address_too(wires):
     assert wire.session.reception.vehicle[:2] == (1, 1)
     assert wire.session.reason == ""
     assert "link restart 1.1 is taken for the autopilot, in place of 9.1" in wire.session.keeper.said
+
+
+def test_what_another_vehicle_said_of_its_place_is_forgotten_with_it(wires):
+    """A helicopter's companion was received first, with its own receiver 30 m off and an origin in another town: the
+    vehicle's own place was sent about them, 30 m and 44 km off, at quality 69."""
+    wire, other, mav = wires(), Hover(boot_s=500.0, north_m=30.0), coder(1, 2)
+    other.mav = mav
+
+    def due():
+        origin = mav.gps_global_origin_encode(round((ORIGIN[0] + 0.0003) * 1e7), round(ORIGIN[1] * 1e7), 400_000)
+        wire.socket.send(bytes(origin.pack(mav)))
+        for frame in other.frames(wire.t_s):
+            wire.socket.send(frame)
+
+    wire.fly(14.0, beside=due)
+    assert wire.session.reception.vehicle[:2] == (1, 1)
+    found = wire.estimates(12.0)
+    assert len(found) > 50
+    assert max(abs(message.x) for message in found) < 0.5
+    assert wire.session.origin_deg_m == pytest.approx(ORIGIN, abs=1e-4)
 
 
 def test_after_an_estimate_was_sent_a_better_one_is_only_said(wires):

@@ -9,7 +9,7 @@ from flownav.cli import options
 from flownav.cli.options import argument, option, out_option, switch
 from flownav.cli.output import Column, answer, figure, progress, require_between, say, table_of
 from flownav.core.errors import InputError, VerdictError
-from flownav.core.guard import an_output_folder
+from flownav.core.guard import an_output_folder, require_may_be_made
 from flownav.core.text import key_words
 
 if TYPE_CHECKING:
@@ -101,6 +101,7 @@ def command(
         engine_named(engine)
         if out is not None:
             Store(an_output_folder(out)).check(plan.as_json)
+            require_may_be_made(out)
         _say_plan(asked, as_json)
         return
     folder = out or Path("out") / f"{asked.name}_certificate"

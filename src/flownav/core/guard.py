@@ -12,6 +12,7 @@ import stat
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from flownav.core import files
@@ -149,6 +150,18 @@ def an_output_folder(path: Path) -> Path:
     if info is not None and not stat.S_ISDIR(info.st_mode):
         raise InputError(f"{path}: cannot be written (it is {_special(info) or 'a file'}); give a folder's name")
     return path
+
+
+def require_may_be_made(path: Path) -> None:
+    """InputError where a folder, or a file in it, could not be made. It is tried beside the nearest folder that is
+    there, and nothing of it stays.
+    """
+    there = next((folder for folder in (path, *path.absolute().parents) if os.path.lexists(folder)), path)
+    try:
+        with TemporaryDirectory(prefix=".", suffix=".part", dir=there):
+            pass
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); give another folder") from None
 
 
 @contextmanager

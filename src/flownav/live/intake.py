@@ -67,6 +67,18 @@ class Intake:
         self.newest_s = self.since_s = NAN
         self.gps_received = False
 
+    def forget_vehicle(self) -> None:
+        """Another autopilot is the vehicle now, which may be another vehicle: nothing of the one before is known of it,
+        neither where its frame begins nor what it read last.
+        """
+        self.begin_anew()
+        dropped, self.sources = self.sources.dropped, Sources()
+        self.sources.dropped = dropped
+        self.origin, self.repeats = Origin(), Repeats()
+        self.latest.clear()
+        self.swaps.clear()
+        self._flow_s = NAN
+
     @property
     def horizon_s(self) -> float:
         """How far behind the newest reading an instant is when it is fused."""

@@ -141,6 +141,7 @@ class Session:
         why_restarted = f"{names[0]} is taken for the autopilot, in place of {names[1]}"
         self._restart(self.clock.now_s(now_s), why_restarted, NAN)
         self.reception.take(better)
+        self.intake.forget_vehicle()
         self._vehicle_s = NAN
         self.turns += 1
         self._meet(better, now_s)

@@ -197,3 +197,26 @@ def test_what_would_be_read_for_ever_or_lies_elsewhere_is_named(folder, tmp_path
     facts["files"]["out"]["records/x"] = "0"
     (folder / "certificate.json").write_text(json.dumps(facts), encoding="utf-8")
     assert said in wrong(folder)["files"]
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    (lambda rows: rows.slice(0, 0), "cell 0 has 0 flights, not 52"),
+    (lambda rows: rows.slice(0, 51), "cell 0 has 51 flights, not 52"),
+    (lambda rows: pa.concat_tables([rows, rows]), "cell 0 has 104 flights, not 52"),
+    (lambda rows: pa.concat_tables([rows.slice(0, 51), rows.slice(0, 1)]), "row 52 of cell 0 is flight 0, not 51"),
+])  # fmt: skip
+def test_flights_of_another_version_are_counted(folder, change, said):
+    """Fewer or more of them were an error of Arrow or NumPy in certificate.json; one that came twice was not seen."""
+    rewritten(folder, change)
+    rehashed(folder, lambda facts: facts["made_by"].update(code_sha256="0" * 64))
+    told = wrong(folder)
+    assert set(told) == {"flights"}
+    assert said in told["flights"]
+
+
+def test_without_a_part_flights_of_another_version_are_missed(folder):
+    (folder / "flights" / "cell-000" / "part-00000.parquet").unlink()
+    rehashed(folder, lambda facts: facts["made_by"].update(code_sha256="0" * 64))
+    told = wrong(folder)
+    assert set(told) == {"files", "flights"}
+    assert "cell 0 has 0 flights, not 52" in told["flights"]

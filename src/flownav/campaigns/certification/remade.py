@@ -30,6 +30,21 @@ def require_drawn(plan: Plan, data: Dataset) -> None:
             raise InputError(f"{data.folder}: cell {cell} has {flights} flights, not {plan.flights}; {ANEW}")
 
 
+def require_numbered(plan: Plan, data: Dataset) -> None:
+    """InputError unless a folder's rows have the numbers of a plan's flights, each once and in order. What another
+    version of flownav drew for them is not known here.
+    """
+    for cell, own in enumerate(plan.cells):
+        numbers = data.column(cell, "flight").tolist() if data.parts(cell) else []
+        if len(numbers) != plan.flights:
+            raise InputError(f"{data.folder}: cell {cell} has {len(numbers)} flights, not {plan.flights}; {ANEW}")
+        row = next((row for row, number in enumerate(numbers) if number != own.first + row), None)
+        if row is not None:
+            raise InputError(
+                f"{data.folder}: row {row + 1} of cell {cell} is flight {numbers[row]}, not {own.first + row}; {ANEW}"
+            )
+
+
 def _checked_flights(plan: Plan, data: Dataset, cell: int) -> int:
     """How many flights a cell's files hold. InputError where one is not as the plan draws it."""
     ready, first, values = plan.ready(cell), plan.cells[cell].first, plan.cells[cell].values

@@ -18,7 +18,7 @@ from flownav.campaigns.certification.again import SAMPLE
 from flownav.campaigns.certification.cells import plan_of
 from flownav.campaigns.certification.certify import Certificate, checked, judged_from, with_ranking
 from flownav.campaigns.certification.findings import NOT_LOOKED_AT, Verification
-from flownav.campaigns.certification.remade import require_drawn
+from flownav.campaigns.certification.remade import require_drawn, require_numbered
 from flownav.campaigns.certification.signing import SIGNATURE, SIGNATURE_BYTES, is_signed_by, public_key
 from flownav.campaigns.certification.stated import as_written
 from flownav.campaigns.certification.written import (
@@ -79,7 +79,7 @@ def _look(
         chosen = made.facts["chosen"]
         plan = plan_of(asked, chosen["flights"], chosen["vehicle"])
         _made_from(made, asked, plan, requirement)
-        sound = _plan(made, plan, stored_plan, ours=ours) and (not ours or _drawn(made, plan))
+        sound = _plan(made, plan, stored_plan, ours=ours) and (_drawn if ours else _numbered)(made, plan)
         certificate = _figures(made, asked, plan) if sound else None
         if certificate is not None and ours:
             _flights(made, certificate, engine, sample, on_progress)
@@ -228,6 +228,16 @@ def _drawn(made: Verification, plan: Plan) -> bool:
         wrong = str(error)
     flights = plan.flights * len(plan.cells)
     return made.note("flights and inputs", wrong, f"all {flights} rows are the plan's, with what it draws for each")
+
+
+def _numbered(made: Verification, plan: Plan) -> bool:
+    """That the rows are as many as the plan's flights, with their numbers, which any version's are."""
+    wrong = None
+    try:
+        require_numbered(plan, Dataset(made.folder))
+    except InputError as error:
+        wrong = str(error)
+    return made.note("flights", wrong, f"all {plan.flights * len(plan.cells)} rows have the numbers of the plan's")
 
 
 def _figures(made: Verification, asked: Requirement, plan: Plan) -> Certificate | None:

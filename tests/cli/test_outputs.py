@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import subprocess
 import sys
 import time
 from io import StringIO
@@ -260,3 +261,28 @@ def test_a_stage_is_named_while_it_lasts_and_counts_when_the_next_begins(monkeyp
             begin(name)
             shown.append((bar.tasks[0].description, bar.tasks[0].completed, bar.tasks[0].total))
     assert shown == [("Measuring flights", 0, 3), ("Measuring a replay", 1, 3), ("Measuring help", 2, 3)]
+
+
+# -- no room -------------------------------------------------------------------------------------------------------
+def without_room(tmp_path, *asked, most=4096, **to):
+    """The one line of a command that may write no file larger than `most` bytes, run by itself."""
+    limit = f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({most}, {most}))"
+    run = f"{limit}; import sys; from flownav.__main__ import main; sys.argv = ['flownav', *{list(map(str, asked))!r}]"
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    done = subprocess.run(
+        [sys.executable, "-c", f"{run}; main()"], cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True, **to
+    )
+    assert done.returncode == 2
+    (line,) = done.stderr.strip().splitlines()
+    return line
+
+
+def test_a_full_disk_names_what_was_being_written(tmp_path):
+    """As of a limit on a file's size, which fails as a full disk does: without a name."""
+    certified = without_room(tmp_path, "certify", "approach", "--out", "c", most=64, stdout=subprocess.DEVNULL)
+    assert certified == "flownav: c/campaign.json: File too large"
+
+
+def test_a_full_disk_under_the_output_says_that_it_is_the_output(tmp_path):
+    with Path("/dev/full").open("w") as output:
+        assert without_room(tmp_path, "--help", stdout=output) == "flownav: the output: No space left on device"

@@ -1,6 +1,7 @@
 """The command line: one module per command, each importing its job only when it is called; how it runs and ends."""
 
 import io
+import os
 import re
 import sys
 from collections.abc import Iterable
@@ -137,8 +138,21 @@ def run(app: typer.Typer) -> None:
     except MemoryError:
         _leave("there is not enough memory for this; give less at once", BAD_INPUT)
     except OSError as error:  # a disk that is full, a file that went away
-        _leave(f"{error.filename or 'a file'}: {error.strerror or error}", BAD_INPUT)
+        _leave(f"{error.filename or _unwritten()}: {error.strerror or error}", BAD_INPUT)
     sys.exit(status if isinstance(status, int) else DONE)
+
+
+def _unwritten() -> str:
+    """What an error of writing is about that names no file: the output, where what is left of it is refused again or
+    the file that it goes to has no room.
+    """
+    try:
+        sys.stdout.flush()
+        room = os.fstatvfs(sys.stdout.fileno())
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python tries, and complains, once more
+        return "the output"
+    return "a file" if room.f_bavail or not room.f_blocks else "the output"
 
 
 def option_of(argument: str) -> str:

@@ -200,7 +200,6 @@ def test_what_would_be_read_for_ever_or_lies_elsewhere_is_named(folder, tmp_path
 
 
 @pytest.mark.parametrize(("change", "said"), [
-    (lambda rows: rows.slice(0, 0), "cell 0 has 0 flights, not 52"),
     (lambda rows: rows.slice(0, 51), "cell 0 has 51 flights, not 52"),
     (lambda rows: pa.concat_tables([rows, rows]), "cell 0 has 104 flights, not 52"),
     (lambda rows: pa.concat_tables([rows.slice(0, 51), rows.slice(0, 1)]), "row 52 of cell 0 is flight 0, not 51"),

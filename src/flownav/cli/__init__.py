@@ -143,7 +143,7 @@ def run(app: typer.Typer) -> None:
 
 
 def _unwritten() -> str:
-    """What an error of writing is about that names no file: the output, where what is left of it is refused again or
+    """The name for an error of writing that names no file: "the output" where the rest of it is refused again, or where
     the file that it goes to has no room.
     """
     try:

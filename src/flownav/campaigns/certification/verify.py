@@ -79,7 +79,7 @@ def _look(
         chosen = made.facts["chosen"]
         plan = plan_of(asked, chosen["flights"], chosen["vehicle"])
         _made_from(made, asked, plan, requirement)
-        sound = _plan(made, plan, stored_plan, ours=ours) and (_drawn if ours else _numbered)(made, plan)
+        sound = _plan(made, plan, stored_plan, ours=ours) and _drawn(made, plan, ours)
         certificate = _figures(made, asked, plan) if sound else None
         if certificate is not None and ours:
             _flights(made, certificate, engine, sample, on_progress)
@@ -219,25 +219,16 @@ def _plan(made: Verification, plan: Plan, stored: dict[str, Any], *, ours: bool)
     return made.note("plan", wrong, f"seed {plan.seed}, {plan.flights} flights a cell, as the requirement makes them")
 
 
-def _drawn(made: Verification, plan: Plan) -> bool:
-    """That the rows are the plan's flights with the inputs that it draws, all of them."""
-    wrong = None
+def _drawn(made: Verification, plan: Plan, ours: bool) -> bool:
+    """That the rows are all of the plan's flights, by its inputs, or by their numbers where another version drew."""
+    wrong, flights = None, plan.flights * len(plan.cells)
     try:
-        require_drawn(plan, Dataset(made.folder))
+        (require_drawn if ours else require_numbered)(plan, Dataset(made.folder))
     except InputError as error:
         wrong = str(error)
-    flights = plan.flights * len(plan.cells)
-    return made.note("flights and inputs", wrong, f"all {flights} rows are the plan's, with what it draws for each")
-
-
-def _numbered(made: Verification, plan: Plan) -> bool:
-    """That the rows are as many as the plan's flights, with their numbers, which any version's are."""
-    wrong = None
-    try:
-        require_numbered(plan, Dataset(made.folder))
-    except InputError as error:
-        wrong = str(error)
-    return made.note("flights", wrong, f"all {plan.flights * len(plan.cells)} rows have the numbers of the plan's")
+    if ours:
+        return made.note("flights and inputs", wrong, f"all {flights} rows are the plan's, with what it draws for each")
+    return made.note("flights", wrong, f"all {flights} rows have the numbers of the plan's")
 
 
 def _figures(made: Verification, asked: Requirement, plan: Plan) -> Certificate | None:

@@ -10,8 +10,9 @@ import pytest
 from flownav.core.measurement import Sensor, Stream
 from flownav.core.record import POSITION_NED
 from flownav.logs import open_log as opening
+from flownav.logs.heights_alike import upside_down
 from flownav.logs.open_log import open_log
-from flownav.logs.references import examined, of_one_origin, upside_down
+from flownav.logs.references import examined, of_one_origin
 from replay_logs import log_of_flight
 
 T_S = np.arange(0.0, 40.0, 0.1)
@@ -156,7 +157,8 @@ def test_a_reference_whose_down_points_up_is_left_out(tmp_path, left):
     made.tables["truth"]["z_m"] = -place["z_m"]
     log = open_log(made.write(tmp_path / "wrong"))
     assert log.truth is None
-    assert f"truth.csv is left out: its down points up, as {left} shows; give it with z downwards" in log.notes
+    shown = f"{left} and the accelerometer show" if left == "baro" else f"the accelerometer and {left} show"
+    assert f"truth.csv is left out: its down points up, as {shown}; give it with z downwards" in log.notes
 
 
 def test_without_a_climb_nothing_is_told_of_down():

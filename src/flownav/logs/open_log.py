@@ -10,10 +10,12 @@ from flownav.core.guard import an_input
 from flownav.core.measurement import Sensor
 from flownav.logs.crazyflie_blocks import looks_like as looks_like_crazyflie
 from flownav.logs.dataflash.text_form import is_text
+from flownav.logs.heights_alike import upside_down
 from flownav.logs.journal import MAGIC as JOURNAL_MAGIC
 from flownav.logs.journal import SUFFIX as JOURNAL_SUFFIX
 from flownav.logs.log import Log
-from flownav.logs.references import examined, upside_down
+from flownav.logs.references import examined
+from flownav.logs.seen_motion import moves_as_seen
 from flownav.logs.topic_files import is_topic_folder
 
 KNOWN = (
@@ -41,8 +43,8 @@ YEARS_US = (1.0e15, 4.2e15)  # microseconds of the years 2001 to 2103
 
 
 def open_log(path: Path, *, flow_instance: int | None = None, topics: Mapping[str, str] | None = None) -> Log:
-    """Read a recorded flight of any known format; of its reference, strays are left out and leaps taken back, each with
-    a note.
+    """Read a recorded flight of any known format; its reference is examined (`logs/references.py`, `seen_motion.py`):
+    what cannot be is left out, leaps are taken back, each with a note.
 
     flow_instance: which of several flow sensors; None takes the one with most readings. topics: of a ROS bag, which
     topic serves as what, by role. InputError where the path is missing or no known format, or the log cannot be read.
@@ -51,13 +53,14 @@ def open_log(path: Path, *, flow_instance: int | None = None, topics: Mapping[st
     if log.truth is None:
         return log
     if witness := upside_down(log.truth, log.streams):
-        note = f"{log.truth_name} is left out: its down points up, as {witness} shows; give it with z downwards"
+        shows = "show" if " and " in witness else "shows"
+        note = f"{log.truth_name} is left out: its down points up, as {witness} {shows}; give it with z downwards"
         return replace(log, truth=None, heading_truth=None, notes=(*log.notes, note))
     truth, notes = examined(log.truth, log.truth_name, log.streams.get(Sensor.IMU))
     if len(log.truth["t_s"]) and not len(truth["t_s"]):
         note = f"{log.truth_name} is left out: none of its rows is a place within 100 km; metres are needed"
         return replace(log, truth=None, heading_truth=None, notes=(*log.notes, note))
-    return replace(log, truth=truth, notes=(*log.notes, *notes)) if notes else log
+    return moves_as_seen(replace(log, truth=truth, notes=(*log.notes, *notes)) if notes else log)
 
 
 def _read(path: Path, flow_instance: int | None, topics: Mapping[str, str] | None) -> Log:

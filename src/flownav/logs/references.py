@@ -5,14 +5,14 @@ not an error of 700 m rms of the estimate compared with it. The path goes on whe
 scored as it is.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.measurement import Array, Sensor, Stream
+from flownav.core.measurement import Array, Stream
 from flownav.core.record import POSITION_NED, Table
 from flownav.logs.unfelt import Unfelt, unfelt
 
@@ -23,30 +23,8 @@ STEPS = 5  # whose median is the motion before a leap
 MOST_STRAYS = 0.2  # of the rows; with more nothing is known of which are right
 LEAST_SCATTERS = 6.0  # of the path about its motion, that a leap is longer than
 LEAST_MOVE_M, LEAST_ROWS = 1.0, 10  # of an origin; rows before and after
-LEAST_HEIGHTS, LEAST_CLIMB_M, LEAST_LIKENESS = 50, 0.3, 0.9  # readings; rms; correlation that shows up from down
 SHOWN = 3
 MOST_UNFELT = 20  # leaps that no accelerometer felt
-
-
-def upside_down(truth: Table, streams: Mapping[Sensor, Stream]) -> str:
-    """Which sensor of height shows that a reference's down points up; "" where none does."""
-    t_s, up_m = np.asarray(truth["t_s"], float), -np.asarray(truth[POSITION_NED[2]], float)
-    for sensor in (Sensor.BARO, Sensor.RANGE):
-        stream = streams.get(sensor)
-        if stream is None:
-            continue
-        at_s, height_m = stream.t_s - stream.delay_s, stream.value[:, 0]
-        inside = (
-            (at_s >= t_s[0]) & (at_s <= t_s[-1]) & np.isfinite(height_m) & ((height_m > 0.0) | (sensor != Sensor.RANGE))
-        )
-        if np.count_nonzero(inside) < LEAST_HEIGHTS:
-            continue
-        ours, theirs = np.interp(at_s[inside], t_s, up_m), height_m[inside]
-        if min(ours.std(), theirs.std()) < LEAST_CLIMB_M:
-            continue
-        # a barometer that saw the climb decides: a range over a slope falls as its vehicle climbs
-        return sensor.name.lower() if float(np.corrcoef(ours, theirs)[0, 1]) < -LEAST_LIKENESS else ""
-    return ""
 
 
 def _rows(table: Table, kept: NDArray[np.bool_]) -> Table:

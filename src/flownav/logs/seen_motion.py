@@ -115,11 +115,11 @@ def _turned(
     first = next(iter(beside.values()))
     agree = all(abs(np.angle(np.exp(1j * (by - first)))) <= ALIKE_RAD for by in beside.values())
     how = f"points {abs(np.degrees(first)):.0f}° to the {'left' if first > 0.0 else 'right'} of the path"
-    said = "its path and its heading contradict each other"
+    words = "its path and its heading contradict each other"
     if len(beside) > 1 and agree:
-        return f"{said}: what {' and '.join(beside)} saw, turned by the heading, {how}; its heading is left out", True
+        return f"{words}: what {' and '.join(beside)} saw, turned by the heading, {how}; its heading is left out", True
     (name, *_) = beside
-    return f"{said}, or {name} is mounted turned: what it saw, turned by the heading, {how}", False
+    return f"{words}, or {name} is mounted turned: what it saw, turned by the heading, {how}", False
 
 
 def _without_heading(truth: Table) -> Table:

@@ -67,8 +67,11 @@ def fit_of(t_s: Array, path: Array, witness: Witness) -> Fit | None:
     if len(grid) * STEP_S < LEAST_S:
         return None
     seen = averaged(witness.t_s, witness.level, grid)
-    lags = np.arange(-LATEST_S, LATEST_S + 0.5 * LAG_STEP_S, LAG_STEP_S)
-    moved = [motion(t_s, path, grid + lag, witness.order) for lag in lags]
+    most = round(LATEST_S / LAG_STEP_S)
+    lags = LAG_STEP_S * np.arange(-most, most + 1)
+    every = round(STEP_S / LAG_STEP_S)
+    fine = motion(t_s, path, grid[0] + LAG_STEP_S * np.arange(-most, every * len(grid) + most), witness.order)
+    moved = [fine[first : first + every * len(grid) : every] for first in range(len(lags))]
     known = np.isfinite(seen) & np.all([np.isfinite(one) for one in moved], axis=0)
     if np.count_nonzero(known) * STEP_S < LEAST_S:
         return None

@@ -21,6 +21,7 @@ Complex = NDArray[np.complex128]
 
 HALF_S = 0.25  # half of the time over which a velocity is taken: chosen, against noise
 HALF_LEVEL_S = 10.0  # of the time over which the specific force tells what is level
+HALF_TILT_S = 2.5  # of the time over which a vehicle in flight tilts; a gyro that warms up drifts more slowly
 HALF_RATE_S = 0.02  # of the time over which an attitude turns: about a reading of flow
 LONGEST_GAP_S = 0.5  # between rows of a reference, and readings of a range
 LONGEST_IMU_S = 0.1  # between readings of an accelerometer
@@ -46,7 +47,9 @@ def witnesses_of(truth: Table, streams: Mapping[Sensor, Stream]) -> list[Witness
 
 
 def tilt_change_rad(streams: Mapping[Sensor, Stream], begin_s: float, end_s: float) -> float:
-    """By how much the gyro rolls or pitches the vehicle at most within a time, but for a bias [rad]; 0 without one."""
+    """By how much the gyro rolls or pitches the vehicle at most from its mean over 2 HALF_TILT_S, within a time, but
+    for a bias [rad]; 0 without one.
+    """
     imu = streams.get(Sensor.IMU)
     if imu is None:
         return 0.0
@@ -55,9 +58,8 @@ def tilt_change_rad(streams: Mapping[Sensor, Stream], begin_s: float, end_s: flo
     if np.count_nonzero(inside) < 3:
         return 0.0
     at_s, rates = t_s[inside], imu.value[inside, :2]
-    turned = integrated(rates, np.diff(at_s))
-    steady = turned[-1] * ((at_s - at_s[0]) / (at_s[-1] - at_s[0]))[:, None]
-    return float(np.abs(turned - steady).max())
+    turned = integrated(rates - rates.mean(axis=0), np.diff(at_s)) @ np.array([1.0, 1j])
+    return float(np.nanmax(np.abs(turned - averaged(at_s, turned, at_s, HALF_TILT_S))))
 
 
 def joined(at_s: Array, t_s: Array, value: Array) -> Array:

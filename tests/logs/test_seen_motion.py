@@ -95,13 +95,29 @@ def test_a_path_that_two_sensors_show_to_be_mirrored_is_left_out(tmp_path, first
     assert note.endswith(f" as it is) and {others} show; give east to the right of north")
 
 
+@pytest.mark.parametrize("without", ANY)
+@pytest.mark.parametrize("across_m", [0.0, 0.1, 0.3])
+def test_a_flight_to_and_fro_along_a_line_has_no_hand(tmp_path, without, across_m):
+    """Its mirror image is a turned line: what is left of either is the sensors' small errors."""
+
+    def along(t):
+        return np.column_stack([3.8 * np.sin(1.6 * t), across_m * np.sin(0.3 * t), -2.0 + 0.1 * np.sin(0.3 * t)])
+
+    made = beside_its_truth(log_of_flight(FLIGHT_S, along=along))
+    for name in without:
+        del made.tables[name]
+    log = open_log(made.write(tmp_path / "log"))
+    assert log.truth is not None
+    assert not [note for note in said(log) if "mirrored" in note]
+
+
 @pytest.mark.parametrize(("by", "without"), [("GPS", ONLY_GPS), ("flow", ONLY_FLOW)])
 def test_what_one_sensor_alone_shows_to_be_mirrored_is_named_and_kept(tmp_path, by, without):
     log = logged(tmp_path, mirrored, without)
     assert log.truth is not None
     (note,) = said(log)
     assert note.startswith(f"truth.csv: its path is mirrored against {by} (R² ")
-    assert note.endswith(" as it is): an axis of one of the two has the wrong sign")
+    assert note.endswith(" as it is): an axis of one of them has the wrong sign")
 
 
 def test_an_axis_of_the_flow_with_the_wrong_sign_is_no_fault_of_the_reference(tmp_path):
@@ -141,6 +157,36 @@ def test_a_heading_is_judged_with_the_lag_taken_out(tmp_path):
     assert float(late.split(" ")[2]) == pytest.approx(0.7, abs=0.1)
 
 
+def test_a_gyro_with_the_wrong_sign_leaves_nothing_out(tmp_path):
+    """Without an attitude it turns what the accelerometer felt and what the flow saw."""
+
+    def laps(t):
+        return np.column_stack(
+            [5.0 * np.sin(0.5 * t) + 2.0 * np.sin(0.13 * t), 5.0 - 5.0 * np.cos(0.5 * t), -3.0 + 0.0 * t]
+        )
+
+    made = beside_its_truth(log_of_flight(FLIGHT_S, yaw_rate=0.5, along=laps))
+    for name in ("gps", "attitude", "heading_truth"):
+        del made.tables[name]
+    made.tables["imu"]["gyro_z_rad_s"] = -made.tables["imu"]["gyro_z_rad_s"]
+    log = open_log(made.write(tmp_path / "log"))
+    assert log.truth is not None
+    assert said(log)[0].startswith("truth.csv: its path is mirrored against the accelerometer and flow (R² ")
+
+
+@pytest.mark.parametrize("without", ANY)
+def test_a_steady_circle_shows_no_lag(tmp_path, without):
+    """A late circle is a turned circle."""
+    made = beside_its_truth(log_of_flight(FLIGHT_S, along=_circling))
+    noise = np.random.default_rng(5)
+    for axis in "xy":
+        accel = made.tables["imu"][f"accel_{axis}_m_s2"]
+        made.tables["imu"][f"accel_{axis}_m_s2"] = accel + noise.normal(0.0, 0.3, len(accel))
+    for name in without:
+        del made.tables[name]
+    assert not [note for note in said(open_log(made.write(tmp_path / "log"))) if "late" in note or "early" in note]
+
+
 def test_two_sensors_against_gps_leave_nothing_out(tmp_path):
     """A vehicle whose IMU and flow are mirrored themselves."""
     made = log_of_flight(FLIGHT_S)
@@ -152,7 +198,7 @@ def test_two_sensors_against_gps_leave_nothing_out(tmp_path):
     del made.tables["attitude"]
     log = open_log(beside_its_truth(made).write(tmp_path / "log"))
     assert log.truth is not None
-    assert said(log)[0].startswith("truth.csv: its path is mirrored against the accelerometer (R² ")
+    assert said(log)[0].startswith("truth.csv: its path is mirrored against the accelerometer and flow (R² ")
 
 
 def test_a_heading_that_the_flow_alone_contradicts_is_named_and_kept(tmp_path):
@@ -280,6 +326,22 @@ def test_a_barometer_in_rotor_wash_does_not_hide_what_is_upside_down(tmp_path, w
     wrong = open_log(made.write(tmp_path / "wrong"))
     assert wrong.truth is None
     assert "its down points up, as the accelerometer " in said(wrong)[0]
+
+
+def test_a_barometer_that_drifts_does_not_turn_a_range_upside_down():
+    """A slow climb of 0.8 m while the pressure rises by what 2.4 m are."""
+
+    def along(t):
+        return np.column_stack([5 * np.sin(0.3 * t), 4 * np.sin(0.21 * t), -1.0 - 0.8 / (1 + np.exp(-(t - 60) / 6))])
+
+    made = log_of_flight(120.0, along=along)
+    t_s, up = made.t_s, -made.position[:, 2]
+    truth = {"t_s": t_s, "pos_n_m": made.position[:, 0], "pos_e_m": made.position[:, 1], "pos_d_m": -up}
+    baro = Stream.of(Sensor.BARO, t_s[::100], (up - 0.02 * t_s)[::100, None])
+    distance = Stream.of(Sensor.RANGE, t_s[::50], up[::50, None])
+    assert upside_down(truth, {Sensor.BARO: baro, Sensor.RANGE: distance}) == ""
+    turned = truth | {"pos_d_m": up}
+    assert upside_down(turned, {Sensor.RANGE: distance}) == "range"
 
 
 def test_a_range_over_a_slope_is_outvoted_by_the_accelerometer():

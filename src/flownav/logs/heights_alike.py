@@ -32,15 +32,13 @@ class _Sign(NamedTuple):
 def upside_down(truth: Table, streams: Mapping[Sensor, Stream]) -> str:
     """Which sensors of height show that a reference's down points up, in words; "" where none does.
 
-    Barometer, accelerometer and range are asked, and most of those that show it clearly decide; of two that contradict
-    each other the first: a range over a slope falls as its vehicle climbs.
+    Barometer, accelerometer and range are asked, and most of those that show it clearly decide. Of two that contradict
+    each other one is wrong: a barometer drifts with the weather, a range over a slope falls as its vehicle climbs.
     """
     t_s, up_m = np.asarray(truth["t_s"], float), -np.asarray(truth[POSITION_NED[2]], float)
     signs = [sign for sign in heights_alike(t_s, up_m, streams) if sign.says]
-    if not signs:
-        return ""
-    verdict = sum(sign.says for sign in signs) or signs[0].says
-    return " and ".join(sign.name for sign in signs if sign.says < 0) if verdict < 0 else ""
+    against = [sign.name for sign in signs if sign.says < 0]
+    return " and ".join(against) if 2 * len(against) > len(signs) else ""
 
 
 def heights_alike(t_s: Array, up_m: Array, streams: Mapping[Sensor, Stream]) -> list[_Sign]:

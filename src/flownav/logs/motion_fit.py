@@ -24,7 +24,9 @@ LEAST_MOTION = (0.15, 0.15)  # rms of what was seen, m/s and m/s2
 LATEST_S, LAG_STEP_S = 2.0, 0.05
 FITS = 0.8  # R2 of a path that fits
 FITS_NOISILY = 0.5  # R2 of a path that fits where the other hand explains a third of that at most
-UNEXPLAINED = 3.0  # times as much is left by a path that does not fit
+UNEXPLAINED, LEAST_UNEXPLAINED = 3.0, 0.05  # is left by a path that does not fit: times as much, and of all. Along a
+# straight line both hands fit, and what is left of either is small errors
+LATE_LEAST = 0.02  # is left at least without a lag that leaves UNEXPLAINED times less; a late circle is a turned circle
 LATE_UNEXPLAINED = 1.5  # times as much is left without the lag
 ALIKE_RAD = np.radians(15.0)  # of one window's turn with the whole's
 
@@ -47,12 +49,14 @@ class Fit(NamedTuple):
     @property
     def is_late(self) -> bool:
         """Whether what was seen is explained clearly better with the lag."""
-        return 1.0 - self.at_once >= LATE_UNEXPLAINED * (1.0 - self.explained)
+        left, left_at_once = 1.0 - self.explained, 1.0 - self.at_once
+        much = left_at_once - left >= LEAST_UNEXPLAINED and left_at_once >= LATE_UNEXPLAINED * left
+        return much or left_at_once >= max(UNEXPLAINED * left, LATE_LEAST)
 
 
 def _clearly(fits: float, does_not: float) -> bool:
     """Whether one R2 is of a path that fits and another of one that does not."""
-    clear = fits >= FITS and 1.0 - does_not >= UNEXPLAINED * (1.0 - fits)
+    clear = fits >= FITS and 1.0 - does_not >= max(UNEXPLAINED * (1.0 - fits), LEAST_UNEXPLAINED)
     return clear or (fits >= FITS_NOISILY and UNEXPLAINED * does_not <= fits)
 
 

@@ -6,7 +6,7 @@ are named and nothing is left out.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -40,7 +40,7 @@ def moves_as_seen(log: Log) -> Log:
         log = replace(log, truth=truth, notes=(*log.notes, f"{log.truth_name} {note}"))
     t_s, path = path_of(log.truth or {})
     fits = [(witness, fit) for witness in witnesses if (fit := fit_of(t_s, path, witness)) is not None]
-    note, useless = _mirrored({witness.name: fit for witness, fit in fits})
+    note, useless = _mirrored(fits)
     if note:
         log = replace(log, notes=(*log.notes, f"{log.truth_name}{' is left out' if useless else ''}: {note}"))
     if useless:
@@ -55,19 +55,23 @@ def moves_as_seen(log: Log) -> Log:
     return replace(log, notes=(*log.notes, f"{log.truth_name} {late}")) if late else log
 
 
-def _mirrored(fits: Mapping[str, Fit]) -> tuple[str, bool]:
-    """In words whether the path's mirror image is what was flown, and whether that is sure."""
-    against = {name: fit for name, fit in fits.items() if fit.hand < 0}
-    if sum(fit.hand for fit in fits.values()) >= 0:
+def _mirrored(fits: Sequence[tuple[Witness, Fit]]) -> tuple[str, bool]:
+    """In words whether the path's mirror image is what was flown, and whether that is sure: by two sensors that do not
+    both hang on the gyro's sign, none being against it.
+    """
+    against = {witness.name: fit for witness, fit in fits if fit.hand < 0}
+    if sum(fit.hand for _, fit in fits) >= 0:
         return "", False
+    by_gyro = all(witness.by_gyro for witness, fit in fits if fit.hand < 0)
     first, *others = against
     how = f"(R² {against[first].mirrored:.2f} by the mirror image, {against[first].explained:.2f} as it is)"
-    if others and not any(fit.hand > 0 for fit in fits.values()):
+    if others and not by_gyro and not any(fit.hand > 0 for _, fit in fits):
         return (
             f"its path is mirrored, as {first} {how} and {' and '.join(others)} show; give east to the right of north",
             True,
         )
-    return f"its path is mirrored against {first} {how}: an axis of one of the two has the wrong sign", False
+    names = " and ".join(against)
+    return f"its path is mirrored against {names} {how}: an axis of one of them has the wrong sign", False
 
 
 def _late(fits: Sequence[tuple[Witness, Fit]]) -> str:

@@ -30,7 +30,8 @@ GPS, FLOW, ACCELEROMETER = "GPS", "flow", "the accelerometer"
 
 class Witness(NamedTuple):
     """A sensor's name, its instants t_s (n,), and its motion (n,) each: in the body's axes (None of GPS), and in level
-    axes. order: 1 of a velocity [m/s], 2 of an acceleration [m/s2].
+    axes. order: 1 of a velocity [m/s], 2 of an acceleration [m/s2]. by_gyro: whether the IMU's gyro turned it level, so
+    that a wrong sign of that is its own.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Witness(NamedTuple):
     body: Complex | None
     level: Complex
     order: int = 1
+    by_gyro: bool = False
 
 
 def witnesses_of(truth: Table, streams: Mapping[Sensor, Stream]) -> list[Witness]:
@@ -109,7 +111,7 @@ def _accelerometer(streams: Mapping[Sensor, Stream]) -> Witness | None:
     slow = averaged(t_s, across / -GRAVITY_M_S2 - tilt, t_s, HALF_LEVEL_S)
     level = averaged(t_s, across - (tilt + slow) * force[:, 2], t_s)
     known = np.isfinite(level)
-    return Witness(ACCELEROMETER, t_s[known], (level * np.exp(-1j * yaw))[known], level[known], 2)
+    return Witness(ACCELEROMETER, t_s[known], (level * np.exp(-1j * yaw))[known], level[known], 2, True)
 
 
 def _counted(t_s: Array, rates: Array) -> tuple[Array, Complex]:
@@ -140,7 +142,8 @@ def _flow(streams: Mapping[Sensor, Stream], truth: Table) -> Witness | None:
         height = _height_at(streams, t_s, truth)
         body = height * ((stream.value[:, 1] - rates[:, 1]) - 1j * (stream.value[:, 0] - rates[:, 0]))
     known = np.isfinite(body) & np.isfinite(yaw) & (stream.quality > 0.0)
-    return Witness(FLOW, t_s[known], body[known], (body * np.exp(1j * yaw))[known])
+    by_gyro = Sensor.ATTITUDE not in streams
+    return Witness(FLOW, t_s[known], body[known], (body * np.exp(1j * yaw))[known], by_gyro=by_gyro)
 
 
 def _rates_at(streams: Mapping[Sensor, Stream], flow: Stream, t_s: Array) -> Array:

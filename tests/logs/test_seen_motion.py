@@ -236,7 +236,7 @@ def test_rows_in_which_a_tracker_is_stuck_are_left_out(tmp_path, by, without):
     log = logged(tmp_path, stuck, without)
     assert log.truth["t_s"][-1] == pytest.approx(0.5 * FLIGHT_S, abs=0.05)
     (note,) = said(log)
-    assert note.startswith("truth.csv repeats one place from 30.0")
+    assert note.startswith("truth.csv stands still from 30.0")
     assert note.endswith(f" while {by} shows that the vehicle goes on; these rows are left out")
 
 
@@ -247,7 +247,7 @@ def test_a_vehicle_that_circles_about_the_place_has_gone_on_too(tmp_path):
     for name in ("x_m", "y_m", "z_m"):
         truth[name] = np.where(held, truth[name][np.searchsorted(truth["t_s"], 30.0)], truth[name])
     log = open_log(made.write(tmp_path / "log"))
-    assert "truth.csv repeats one place from 30.0" in said(log)[0]
+    assert "truth.csv stands still from 30.0" in said(log)[0]
     assert log.truth["t_s"][-1] == pytest.approx(30.0, abs=0.1)
 
 
@@ -375,7 +375,7 @@ def test_no_real_reference_is_accused(pattern):
             log = open_log(path)
         except InputError:  # a recorded link without a sensor
             continue
-        words = ("mirrored", "contradict", "repeats one place", " late ", " early ", "points up")
+        words = ("mirrored", "contradict", "stands still", " late ", " early ", "points up")
         assert not [
             note for note in log.notes if note.startswith(log.truth_name) and any(map(note.__contains__, words))
         ]

@@ -1,4 +1,4 @@
-"""Where a log's reference repeats one place although the vehicle goes on: its tracker has lost it."""
+"""Where a log's reference stands still although the vehicle goes on: its tracker has lost it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ STUCK_TILT_RAD = np.radians(1.0)  # more than a vehicle that stands tilts by
 
 
 class Standstill(NamedTuple):
-    """From when to when a path repeats one place [s], and how far the vehicle went from there meanwhile [m]."""
+    """From when to when a path stands still [s], and how far the vehicle went from there meanwhile [m]."""
 
     begin_s: float
     end_s: float
@@ -29,7 +29,7 @@ class Standstill(NamedTuple):
 def stuck_of(
     truth: Table, witnesses: Sequence[Witness], streams: Mapping[Sensor, Stream]
 ) -> tuple[list[Standstill], str]:
-    """Where a tracker repeats one place while the vehicle goes on, as the first sensor shows that agrees with the rest
+    """Where a tracker stands still while the vehicle goes on, as the first sensor shows that agrees with the rest
     of its path; and that sensor.
     """
     t_s, path = path_of(truth)
@@ -75,6 +75,6 @@ def without(truth: Table, stuck: Sequence[Standstill]) -> Table:
 
 
 def words_of(stuck: Sequence[Standstill]) -> str:
-    """When and how far, as "repeats one place from 3.10 to 8.20 s (2.4 m)"; the first SHOWN of them."""
+    """When and how far, as "stands still from 3.10 to 8.20 s (2.4 m)"; the first SHOWN of them."""
     shown = ", ".join(f"from {begin:.2f} to {end:.2f} s ({way:.3g} m)" for begin, end, way in stuck[:SHOWN])
-    return f"repeats one place {shown}" + (f" and {len(stuck) - SHOWN} times more" if len(stuck) > SHOWN else "")
+    return f"stands still {shown}" + (f" and {len(stuck) - SHOWN} times more" if len(stuck) > SHOWN else "")

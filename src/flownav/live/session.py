@@ -19,7 +19,7 @@ from flownav.live.options import Options
 from flownav.live.rates import Rates
 from flownav.live.reception import Reception, Vehicle
 from flownav.live.requests import TRUTHS, Requests, Simulator
-from flownav.live.vehicle_clock import VehicleClock
+from flownav.live.vehicle_clock import MOST_BACK_S, VehicleClock
 from flownav.logs.mavlink.converted import Pose
 from flownav.logs.mavlink.framing import Message
 from flownav.logs.mavlink.messages import CONVERTERS, STATES, LocalState, TrueState
@@ -63,7 +63,7 @@ class Session:
         self.innovations: dict[tuple[int, int], tuple[float, float, int]] = {}  # innovation, test ratio, reason
         self._origin_kept: tuple[float, float, float] | None = None
         self._vehicle_s = NAN  # our clock at the vehicle's last message
-        self._sent_s = self._second_s = float("-inf")
+        self._sent_s = self._second_s = self._stamped_s = float("-inf")
 
     @property
     def dropped(self) -> dict[str, int]:
@@ -244,7 +244,7 @@ class Session:
         until_s = min(t_s, intake.lags.newest_s) - intake.horizon_s
         behind = self.filtering.running is not None and self._feed(until_s)
         since_s = now_s - self._sent_s
-        behind = behind or not self._is_read(t_s, now_s)
+        behind = behind or 0.0 < self._stamped_s - t_s <= MOST_BACK_S or not self._is_read(t_s, now_s)
         if not behind and (self.due or since_s >= SEND_EVERY_S) and since_s >= self.rates.estimate_every_s:
             intake.flow_arrived, self._sent_s = False, now_s
             self._offer(t_s, now_s)
@@ -296,6 +296,7 @@ class Session:
             self.velocities += bool(messages)
         for message in messages:
             self._send(message, now_s)
+            self._stamped_s = t_s
         self.offering.settled |= reason in ("", "nothing_asked")
         if reason:
             self.withheld[reason] += 1

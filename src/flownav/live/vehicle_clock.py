@@ -21,6 +21,7 @@ WINDOW_S = 0.5
 # of the time that passes, by which what was ahead is made up: EKF3 takes no stamp older than its last; chosen
 SLEW = 0.5
 MOST_SLEWED_S = 0.25  # more is of a vehicle's clock that stood still, during which nothing was sent: chosen
+MOST_BACK_S = 1.0  # by which the time may have gone back while nothing is sent, until it has come on: chosen
 
 
 class Exchange(NamedTuple):
